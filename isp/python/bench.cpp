@@ -14,7 +14,6 @@
 #include "isp/base/float_samples.h"
 #include "isp/bench/bench_stages.h"
 #include "isp/cli/bench/bench_args.h"
-#include "isp/cli/bench/bench_methods.h"
 #include "isp/cli/bench/bench_report.h"
 #include "isp/cli/bench/bench_work.h"
 #include "isp/cli/shared/exit_code.h"

@@ -7,7 +7,6 @@
 #include "denoise/denoiser.h"
 #include "isp/bench/bench_stages.h"
 #include "isp/cli/bench/bench_args.h"
-#include "isp/cli/bench/bench_methods.h"
 #include "isp/cli/bench/bench_report.h"
 #include "isp/cli/bench/bench_work.h"
 #include "isp/cli/develop/cost_file.h"

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "isp/cli/bench/findings.h"
+#include "isp/cli/bench/bench_report.h"
 #include "isp/cli/develop/develop_args.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"

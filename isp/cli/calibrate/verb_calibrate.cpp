@@ -8,13 +8,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "calib/noise/raspberry_sensors.h"
 #include "calib/noise/raspberry_tuning.h"
 #include "calib/profile/quoted_profile.h"
 #include "capture/file/file_bytes.h"
 #include "isp/cli/calibrate/calibrate_colour.h"
 #include "isp/cli/calibrate/calibration.h"
-#include "isp/cli/help/help_form.h"
+#include "isp/cli/help/help_text.h"
 #include "isp/cli/help/suggestion.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"

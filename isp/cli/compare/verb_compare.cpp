@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include "isp/cli/compare/compare_args.h"
-#include "isp/cli/compare/compare_report.h"
 #include "isp/cli/compare/compare_work.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"

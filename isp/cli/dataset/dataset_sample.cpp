@@ -14,7 +14,6 @@
 #include "capture/file/file_bytes.h"
 #include "isp/base/json_depth.h"
 #include "isp/cli/dataset/dataset_draw.h"
-#include "isp/cli/dataset/pixel_mask.h"
 #include "isp/cli/dataset/sample_arrays.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/report.h"

@@ -2,14 +2,28 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "isp/base/result.h"
-#include "isp/cli/dataset/dataset_settings.h"
 #include "isp/cli/dataset/sha256.h"
 
 namespace lowlux::cli {
+
+/// Selects the kind of values that a setting has. Even numbers are drawn from ranges whose limits are even.
+enum class SettingKind : std::uint8_t { number, whole, even, text };
+
+/// Describes a key of a spec and the option of `lowlux simulate` that it sets.
+struct Setting {
+  std::string_view key;
+  std::string_view flag;
+  SettingKind kind;
+};
+
+/// Returns all settings.
+std::span<const Setting> settings();
 
 /// Describes how a setting is drawn.
 struct Distribution {

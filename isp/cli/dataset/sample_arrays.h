@@ -11,11 +11,21 @@
 #include "isp/base/image.h"
 #include "isp/base/plane.h"
 #include "isp/base/result.h"
+#include "isp/base/sensor.h"
 #include "isp/cli/dataset/array_file.h"
 #include "isp/cli/dataset/dataset_spec.h"
+#include "isp/cli/simulate/simulate_args.h"
 #include "isp/cli/simulate/simulate_files.h"
 
 namespace lowlux::cli {
+
+/// Lists the bits of a mask.
+inline constexpr unsigned char mask_saturated = 1;  // the code is at the file's white level, or above it
+inline constexpr unsigned char mask_hot = 2;        // the pixel is a hot pixel of the sensor's specimen
+inline constexpr unsigned char mask_shielded = 4;   // the pixel is in a light-shielded column
+
+/// Returns the mask of a simulated frame: one byte for each pixel of the readout.
+Plane<std::uint8_t> mask_of(const RawFrame& frame, const SimulateArgs& args, const SensorModel& sensor);
 
 /// Writes what a sample has as arrays: masks, and in other formats than DNG raws and truths. With `npy` each array is a
 /// file; with `safetensors` they are "raw", "mask", "truth" and "truth_electrons" of one file. Raws and masks are

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
+#include <numeric>
 #include <system_error>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "calib/dark/dark_library.h"
 #include "calib/dark/light_in_darks.h"
 #include "capture/file/dng_source.h"
+#include "isp/base/executor.h"
 #include "isp/cli/calibrate/calibration.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/profile_option.h"
@@ -18,6 +20,7 @@
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/measure/masked_black.h"
+#include "isp/raw/subtract_dark_frame.h"
 #include "isp/raw/to_linear.h"
 
 namespace lowlux::cli {
@@ -59,6 +62,38 @@ std::string unchecked_text(const MosaicTiff& master) {
       master.file, master.white ? "floating-point DNG" : "TIFF");
   if (master.scaled) text += "; its values, at most 1, are taken as fractions of 65535";
   return text;
+}
+
+/// Replaces the codes by the signal on top of the mean of the dark frame [DN].
+void subtract(const DarkFrame& dark, const BlackPoint& black, RawDn& raw) {
+  const int width = raw.active.width, height = raw.active.height;
+  Plane<float> signal(width, height);
+  InlineExecutor alone;  // other threads read other files
+  isp::to_fraction(raw, dark, black, signal.view(), alone);
+  PerSite<float> mean{}, range{};
+  for (int site = 0; site < 4; ++site) {
+    mean[site] = static_cast<float>(black.pedestal_dn[site]);
+    range[site] = static_cast<float>(isp::white_at(raw, site)) - mean[site];
+  }
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      float& v = signal.at(x, y);
+      v = v * range[site_of(x, y)] + mean[site_of(x, y)];
+    }
+  }
+  raw.dn = {};
+  raw.dn_float = std::move(signal);
+  raw.active = {0, 0, width, height};
+  raw.masked.clear();
+  raw.masked_is_stated = false;
+  raw.black_tag =
+      BlackLevel{.rows = 2, .columns = 2, .pattern_dn = {black.pedestal_dn.begin(), black.pedestal_dn.end()}};
+}
+
+void add_variance(const DarkFrame& dark, double range_dn, NoiseProfile& noise) {
+  const auto& added = dark.added_variance_dn2;
+  const double mean_dn2 = std::accumulate(added.begin(), added.end(), 0.0) / 4;
+  for (double& offset : noise.offset) offset += mean_dn2 / (range_dn * range_dn);
 }
 
 }  // namespace
@@ -272,6 +307,18 @@ Result<std::shared_ptr<const DarkFrame>> DarkSource::make_or_find(const RawDn& p
   }
   std::rotate(made_.begin(), found, found + 1);  // the most recently used comes first
   return made_.front().frame;
+}
+
+Result<bool> subtract_from_x_trans(DarkSource& darks, const isp::BlackRequest& black, RawFrame& mosaic) {
+  const auto dark = darks.frame_for(mosaic, black);
+  if (!dark) return tl::make_unexpected(dark.error());
+  const auto level = isp::black_of(mosaic.raw, **dark);
+  if (!level) return tl::make_unexpected(level.error());
+  if (mosaic.noise) add_variance(**dark, isp::mean_range_dn(mosaic.raw, *level), *mosaic.noise);
+  subtract(**dark, *level, mosaic.raw);
+  std::ranges::copy((*dark)->unknown, std::back_inserter(mosaic.corrections.defects));
+  std::ranges::copy((*dark)->warnings, std::back_inserter(mosaic.warnings));
+  return true;
 }
 
 }  // namespace lowlux::cli

@@ -7,8 +7,7 @@
 
 #include "calib/dark/master_dark.h"
 #include "denoise/denoiser.h"
-#include "isp/cli/develop/finish_args.h"
-#include "isp/cli/develop/white_balance_args.h"
+#include "isp/cli/develop/image_args.h"
 #include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/option_values.h"
 #include "isp/render/output_space.h"

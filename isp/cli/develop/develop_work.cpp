@@ -11,10 +11,10 @@
 
 #include "isp/cli/merge/merge_files.h"
 #include "isp/cli/shared/exit_code.h"
-#include "isp/cli/shared/explain_text.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/outputs.h"
 #include "isp/cli/shared/picture_options.h"
+#include "isp/cli/shared/report.h"
 #include "isp/cli/shared/standard_streams.h"
 #include "isp/output/dng/dng_writer.h"
 #include "isp/output/picture/image_writer.h"

@@ -16,8 +16,8 @@
 
 #include "capture/file/dng_source.h"
 #include "isp/cli/develop/batch_report.h"
-#include "isp/cli/develop/flat_files.h"
-#include "isp/cli/develop/x_trans_dark.h"
+#include "isp/cli/develop/calibration_files.h"
+#include "isp/cli/develop/dark_files.h"
 #include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/interruption.h"

@@ -1,5 +1,3 @@
-#include "isp/cli/info/verb_info.h"
-
 #include <algorithm>
 #include <cstdio>
 #include <optional>
@@ -38,6 +36,48 @@ std::optional<NoiseOrigin> noise_of(RawFrame& frame, Executor& executor) {
   return found ? *found : std::nullopt;
 }
 
+int failed(const std::string& file, const Error& error) {
+  if (error.code != ErrorCode::invalid_argument) return print_failure(file, error);
+  const std::string place = error.where.empty() ? "" : " (" + error.where + ")";
+  return print_usage_error("info", {error.code, error.message + place, {}});
+}
+
+/// Advises on the frames of a merge.
+int run_bracket(const InfoArgs& args, RawFrame& frame) {
+  const Result<BracketCase> found = bracket_case(args.advise, frame);
+  if (!found) return failed(args.inputs.front(), found.error());
+  const FrameInfo& info = frame.raw.info;
+  print_out(args.json ? bracket_json(*found, info) + "\n" : bracket_text(*found, info));
+  return exit_done;
+}
+
+/// Runs `info --advise`: prints the advice and writes its page. @return the exit code
+int run_advise(const InfoArgs& args) {
+  const std::string subject = args.inputs.empty() ? args.advise.sensor : args.inputs.front();
+  std::optional<RawFrame> frame;
+  if (!args.inputs.empty()) {
+    auto read = capture::read_raw(args.inputs.front());
+    if (!read) return failed(subject, read.error());
+    frame = *std::move(read);
+  }
+  if (frame && args.advise.sensor.empty()) return run_bracket(args, *frame);
+  const auto asked = advice_case(args.advise, frame ? &*frame : nullptr);
+  if (!asked) return failed(subject, asked.error());
+  const auto advice = isp::advise_exposure(asked->request);
+  if (!advice) return failed(subject, advice.error());
+  if (!args.advise.report.empty()) {
+    const auto overwrite = args.advise.force ? isp::Overwrite::yes : isp::Overwrite::no;
+    const auto written = isp::write_text(args.advise.report, isp::html_of(advice_page(*asked, *advice)), overwrite);
+    if (!written) return failed(args.advise.report, written.error());
+  }
+  if (args.json) {
+    print_out(fmt::format("{}\n", advice_json(*asked, *advice)));
+  } else {
+    print_out(fmt::format("{}", advice_text(*asked, *advice)));
+  }
+  return exit_done;
+}
+
 }  // namespace
 
 int run_info(const std::vector<std::string>& words) {
@@ -64,51 +104,6 @@ int run_info(const std::vector<std::string>& words) {
   }
   if (args.json) print_out(fmt::format("[{}]\n", json));
   return code;
-}
-
-namespace {
-
-int failed(const std::string& file, const Error& error) {
-  if (error.code != ErrorCode::invalid_argument) return print_failure(file, error);
-  const std::string place = error.where.empty() ? "" : " (" + error.where + ")";
-  return print_usage_error("info", {error.code, error.message + place, {}});
-}
-
-/// Advises on the frames of a merge.
-int run_bracket(const InfoArgs& args, RawFrame& frame) {
-  const Result<BracketCase> found = bracket_case(args.advise, frame);
-  if (!found) return failed(args.inputs.front(), found.error());
-  const FrameInfo& info = frame.raw.info;
-  print_out(args.json ? bracket_json(*found, info) + "\n" : bracket_text(*found, info));
-  return exit_done;
-}
-
-}  // namespace
-
-int run_advise(const InfoArgs& args) {
-  const std::string subject = args.inputs.empty() ? args.advise.sensor : args.inputs.front();
-  std::optional<RawFrame> frame;
-  if (!args.inputs.empty()) {
-    auto read = capture::read_raw(args.inputs.front());
-    if (!read) return failed(subject, read.error());
-    frame = *std::move(read);
-  }
-  if (frame && args.advise.sensor.empty()) return run_bracket(args, *frame);
-  const auto asked = advice_case(args.advise, frame ? &*frame : nullptr);
-  if (!asked) return failed(subject, asked.error());
-  const auto advice = isp::advise_exposure(asked->request);
-  if (!advice) return failed(subject, advice.error());
-  if (!args.advise.report.empty()) {
-    const auto overwrite = args.advise.force ? isp::Overwrite::yes : isp::Overwrite::no;
-    const auto written = isp::write_text(args.advise.report, isp::html_of(advice_page(*asked, *advice)), overwrite);
-    if (!written) return failed(args.advise.report, written.error());
-  }
-  if (args.json) {
-    print_out(fmt::format("{}\n", advice_json(*asked, *advice)));
-  } else {
-    print_out(fmt::format("{}", advice_text(*asked, *advice)));
-  }
-  return exit_done;
 }
 
 }  // namespace lowlux::cli

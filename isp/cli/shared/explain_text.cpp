@@ -1,5 +1,3 @@
-#include "isp/cli/shared/explain_text.h"
-
 #include <cmath>
 #include <span>
 
@@ -7,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include "isp/cli/shared/lines.h"
-#include "isp/cli/shared/ratio_report.h"
 #include "isp/cli/shared/report.h"
 #include "isp/pipeline/budget/cost_model.h"
 

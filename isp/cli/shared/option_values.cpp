@@ -16,7 +16,6 @@
 #include "isp/base/shard.h"
 #include "isp/base/text.h"
 #include "isp/cli/config/config_file.h"
-#include "isp/cli/help/help_form.h"
 #include "isp/cli/help/help_page.h"
 #include "isp/cli/help/help_text.h"
 #include "isp/cli/help/suggestion.h"

@@ -8,7 +8,6 @@
 #include "calib/profile/profile_use.h"
 #include "isp/base/camera_profile.h"
 #include "isp/cli/shared/lines.h"
-#include "isp/cli/shared/ratio_report.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/model/sensor/scene_luminance.h"
 #include "isp/raw/black_point.h"
@@ -173,5 +172,16 @@ std::string exposure_text(double exposure_s) {
 }
 
 std::string f_number_text(double f_number) { return "f/" + rounded(f_number, f_number < 1 ? 2 : 1); }
+
+std::array<double, 3> ratio_range(const NoiseRatio& ratio) {
+  const auto [least, most] = std::minmax_element(ratio.ratio.data(), ratio.ratio.data() + ratio.ratio.size());
+  return {static_cast<double>(*least), median_ratio(&ratio), static_cast<double>(*most)};
+}
+
+std::string ratio_text(const NoiseRatio& ratio) {
+  const auto [least, median, most] = ratio_range(ratio);
+  return fmt::format("{:.3g} to {:.3g} times this variance in blocks of {} px, median {:.3g}", least, most,
+                     ratio.block_px, median);
+}
 
 }  // namespace lowlux::cli

@@ -1,17 +1,21 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "calib/flat/flat_field.h"
 #include "isp/base/frame.h"
+#include "isp/base/noise_ratio.h"
 #include "isp/base/result.h"
 #include "isp/cli/config/config_file.h"
 #include "isp/cli/merge/merge_report.h"
 #include "isp/cli/noise/noise_origin.h"
 #include "isp/pipeline/plan.h"
+#include "isp/pipeline/plan/dark_charge.h"
 
 namespace lowlux::cli {
 
@@ -53,5 +57,18 @@ std::string exposure_text(double exposure_s);
 
 /// Returns "f/5.6"; below f/1 with two decimals.
 std::string f_number_text(double f_number);
+
+/// Returns the smallest, the median and the largest ratio of the blocks.
+std::array<double, 3> ratio_range(const NoiseRatio& ratio);
+
+/// Returns the range as text: "0.13 to 1 times this variance in blocks of 8 px, median 0.15".
+std::string ratio_text(const NoiseRatio& ratio);
+
+/// Returns "masked-pixels" and so on, the names in reports.
+std::string_view name_of(BlackPoint::Source source);
+std::string_view name_of(isp::DarkCharge::State state);
+
+/// Returns "profile", "file" or "picture".
+std::string_view name_of(NoiseProfile::Source source);
 
 }  // namespace lowlux::cli

@@ -3,8 +3,6 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/profile/profile_use.h"
-#include "isp/cli/shared/explain_text.h"
-#include "isp/cli/shared/ratio_report.h"
 #include "isp/cli/shared/report.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/model/sensor/scene_luminance.h"

@@ -14,7 +14,6 @@
 #include "isp/cli/develop/memory_gate.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/progress.h"
-#include "isp/cli/simulate/burst_truth.h"
 #include "isp/cli/simulate/scene_argument.h"
 #include "isp/cli/simulate/simulate_args.h"
 #include "isp/cli/simulate/simulate_files.h"

@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "isp/cli/shared/ratio_report.h"
-
 namespace lowlux {
 namespace {
 

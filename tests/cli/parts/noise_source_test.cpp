@@ -12,7 +12,6 @@
 
 #include <gtest/gtest.h>
 
-#include "isp/cli/noise/known_noise.h"
 #include "isp/model/sensor/sensor_db.h"
 #include "isp/raw/to_linear.h"
 #include "tests/support/frames.h"

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "isp/pipeline/options.h"
 
 namespace CLI {
@@ -7,6 +10,12 @@ class App;
 }
 
 namespace lowlux::cli {
+
+/// Adds --wb.
+void add_white_balance(CLI::App& app, isp::WhiteBalanceChoice& choice);
+
+/// Reads the text of --wb. Returns the error, or nothing.
+std::optional<std::string> set_white_balance(const std::string& text, isp::WhiteBalanceChoice& choice);
 
 /// Adds the options of `develop` that change tone and colour: --brightness, --contrast, --saturation.
 void add_adjustments(CLI::App& app, isp::DevelopOptions& options);
