@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "calib/flat/photon_transfer_fit.h"
 #include "calib/flat/transfer_curve.h"
 #include "isp/base/sensor.h"
 

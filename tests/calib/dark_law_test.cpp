@@ -1,4 +1,4 @@
-#include "calib/sheet/dark_law.h"
+#include "calib/sheet/dark_rates.h"
 
 #include <gtest/gtest.h>
 

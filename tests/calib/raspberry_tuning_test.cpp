@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "calib/noise/raspberry_sensors.h"
 #include "calib/profile/profile_io.h"
 
 namespace lowlux::calib {

@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 
 #include "calib/noise/darktable_noise.h"
-#include "calib/noise/raspberry_sensors.h"
+#include "calib/noise/raspberry_tuning.h"
 #include "calib/noise/sensor_class.h"
 #include "calib/picture/picture_noise.h"
 #include "capture/file/file_bytes.h"
