@@ -13,8 +13,6 @@
 #include <type_traits>
 #include <vector>
 
-#include "capture/decoder/jpeg_xl_job.h"
-
 namespace lowlux::capture {
 namespace {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "capture/decoder/decoder_process.h"
-#include "capture/decoder/jpeg_xl_job.h"
+#include "capture/decoder/jpeg_xl_decoder.h"
 #include "capture/file/pass_on.h"
 
 namespace lowlux::capture {

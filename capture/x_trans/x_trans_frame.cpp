@@ -12,7 +12,6 @@
 
 #include "capture/x_trans/x_trans.h"
 #include "capture/x_trans/x_trans_defects.h"
-#include "capture/x_trans/x_trans_noise.h"
 #include "isp/base/executor.h"
 
 namespace lowlux::capture {

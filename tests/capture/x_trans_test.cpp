@@ -14,7 +14,6 @@
 
 #include "capture/file/file_bytes.h"
 #include "capture/x_trans/x_trans_defects.h"
-#include "capture/x_trans/x_trans_noise.h"
 #include "isp/codec/png.h"
 #include "tests/support/executors.h"
 
