@@ -133,4 +133,10 @@ double chroma_confidence(const isp::UvCovariance& covariance, double prior_std);
 /// @param rho                standard deviation of chroma / luma a priori: 1.5 is weak, 0.6 visibly desaturates shadows
 double plane_confidence(double luma, double residual_variance, double rho);
 
+/// Returns means over squares of 2 radius + 1 pixels, cropped at the image's edges. NaN marks a pixel without a value:
+/// NaN and infinities are excluded from the means, and the mean is NaN where a square holds no value. Every mean is
+/// summed anew, so that large values leave no rounding error in others.
+/// @param radius  0 (a copy) to 64
+Plane<double> box_mean(const Plane<double>& values, int radius);
+
 }  // namespace lowlux::denoise

@@ -6,7 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "denoise/picture/box_mean.h"
 #include "isp/model/colour/chroma_bound.h"
 #include "isp/model/colour/chromaticity_cloud.h"
 #include "isp/model/colour/dark_desaturation.h"

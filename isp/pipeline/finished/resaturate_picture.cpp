@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "denoise/picture/box_mean.h"
 #include "denoise/picture/resaturate.h"
 #include "isp/pipeline/finished/encode_picture.h"
 #include "isp/render/output_space.h"
