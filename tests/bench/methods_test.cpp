@@ -14,7 +14,6 @@
 #include "isp/bench/methods/method_scenes.h"
 #include "isp/bench/methods/method_score.h"
 #include "isp/bench/stages/methods_bench.h"
-#include "isp/bench/stages/methods_report.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux::isp {

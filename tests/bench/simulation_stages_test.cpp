@@ -7,8 +7,6 @@
 #include <ctime>
 
 #include "isp/bench/scenes/simulated_camera.h"
-#include "isp/bench/stages/black_point_bench.h"
-#include "isp/bench/stages/simulation_effects_bench.h"
 #include "isp/bench/stages/stage_rows.h"
 #include "isp/raw/measure/masked_black.h"
 

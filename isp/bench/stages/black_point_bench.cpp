@@ -1,5 +1,3 @@
-#include "isp/bench/stages/black_point_bench.h"
-
 #include <algorithm>
 #include <array>
 #include <cassert>

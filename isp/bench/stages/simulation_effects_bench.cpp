@@ -1,5 +1,3 @@
-#include "isp/bench/stages/simulation_effects_bench.h"
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
