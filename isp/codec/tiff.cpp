@@ -11,8 +11,7 @@
 #include <tiffio.h>
 
 #include "isp/codec/source_tags_output.h"
-#include "isp/codec/tiff_info.h"
-#include "isp/codec/tiff_output.h"
+#include "isp/codec/tiff_file.h"
 
 namespace lowlux::isp {
 namespace {

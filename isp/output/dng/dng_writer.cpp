@@ -11,8 +11,7 @@
 
 #include "isp/base/text.h"
 #include "isp/codec/source_tags_output.h"
-#include "isp/codec/tiff_info.h"
-#include "isp/codec/tiff_output.h"
+#include "isp/codec/tiff_file.h"
 #include "isp/output/dng/dng_check.h"
 #include "isp/output/dng/dng_tags.h"
 #include "isp/output/picture/metadata.h"
