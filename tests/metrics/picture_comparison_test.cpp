@@ -9,7 +9,6 @@
 #include <random>
 #include <vector>
 
-#include "isp/metrics/ssim.h"
 #include "isp/model/colour/colour_difference.h"
 #include "isp/render/output_space.h"
 #include "tests/support/numbers.h"

@@ -13,7 +13,6 @@
 #include "isp/cli/shared/report.h"
 #include "isp/metrics/picture_comparison.h"
 #include "isp/metrics/spectral_difference.h"
-#include "isp/metrics/ssim.h"
 
 namespace lowlux::cli {
 namespace {
