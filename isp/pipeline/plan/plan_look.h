@@ -1,18 +1,29 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "isp/base/frame.h"
+#include "isp/base/matrix3.h"
 #include "isp/base/result.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/pipeline/options.h"
 #include "isp/pipeline/plan/look.h"
-#include "isp/pipeline/plan/plan_light.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
 
 namespace lowlux::isp {
+
+/// Holds what a look is decided by: the light of a frame, and how it would be rendered without the look.
+struct FrameLight {
+  std::span<const float> block_luminance;  // white balanced, 1 at the white level, signed
+  double black_noise_std = 0;              // of one pixel, same unit
+  std::optional<WhitePoint> white;         // absent without a colour calibration
+  double exposure_ev = 0;
+  Matrix3 balanced = identity3();  // result of balanced_to_output()
+  double headroom_ev = 0;          // by which the tone curve's range is extended
+};
 
 /// Decides the look: how bright the scene was, how an eye adapted to it perceives it, which effects that requires, and
 /// by how much an automatic exposure is lowered for it (LookPlan::dimming_ev). Returns nullopt where none is requested.

@@ -5,9 +5,10 @@
 #include <type_traits>
 #include <variant>
 
+#include "isp/base/executor.h"
+#include "isp/base/plane.h"
 #include "isp/pipeline/render/frame_needs.h"
 #include "isp/pipeline/render/look_noise.h"
-#include "isp/raw/bin_plane.h"
 #include "isp/render/capture_sharpening.h"
 #include "isp/render/highlights.h"
 #include "isp/render/local_tone.h"
@@ -16,6 +17,20 @@
 
 namespace lowlux::isp {
 namespace {
+
+/// Writes the mean of each complete 2x2 block to `out`, which is floor(height / 2) x floor(width / 2).
+void bin_plane(PlaneView<const float> in, PlaneView<float> out, Executor& executor) {
+  for_each_band(executor, out.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      const float* above = in.row(2 * y);
+      const float* below = in.row(2 * y + 1);
+      float* row = out.row(y);
+      for (int x = 0; x < out.width; ++x) {
+        row[x] = 0.25f * ((above[2 * x] + above[2 * x + 1]) + (below[2 * x] + below[2 * x + 1]));
+      }
+    }
+  });
+}
 
 using Planes = std::array<Plane<float>, 3>;
 
