@@ -1,5 +1,3 @@
-#include "isp/python/bench.h"
-
 #include <exception>
 #include <memory>
 #include <new>
@@ -20,8 +18,9 @@
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/python/call.h"
-#include "isp/python/frame_copy.h"
+#include "isp/python/module.h"
 #include "isp/python/picture_argument.h"
+#include "isp/python/raw_image.h"
 
 namespace lowlux::python {
 namespace {

@@ -11,7 +11,7 @@
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/profile_option.h"
 #include "isp/python/call.h"
-#include "isp/python/simulate.h"
+#include "isp/python/module.h"
 #include "isp/python/text.h"
 
 namespace lowlux::python {

@@ -4,7 +4,7 @@
 
 #include "isp/base/float_samples.h"
 #include "isp/cli/dataset/array_file.h"
-#include "isp/python/frame_copy.h"
+#include "isp/python/raw_image.h"
 
 namespace lowlux::python {
 namespace {

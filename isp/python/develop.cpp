@@ -1,5 +1,3 @@
-#include "isp/python/develop.h"
-
 #include <optional>
 
 #include <pybind11/stl.h>
@@ -12,6 +10,7 @@
 #include "isp/cli/shared/report.h"
 #include "isp/output/picture/image_writer.h"
 #include "isp/python/call.h"
+#include "isp/python/module.h"
 #include "isp/python/text.h"
 
 namespace lowlux::python {

@@ -8,7 +8,6 @@
 #include "isp/cli/develop/memory_gate.h"
 #include "isp/output/dng/dng_check.h"
 #include "isp/python/failure.h"
-#include "isp/python/frame_copy.h"
 #include "isp/python/quiet_numpy.h"
 #include "isp/python/raw_image.h"
 

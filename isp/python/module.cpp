@@ -1,11 +1,10 @@
+#include "isp/python/module.h"
+
 #include <pybind11/pybind11.h>
 
 #include "isp/cli/shared/machine.h"
-#include "isp/python/bench.h"
-#include "isp/python/develop.h"
 #include "isp/python/failure.h"
 #include "isp/python/raw_image.h"
-#include "isp/python/simulate.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
 
 PYBIND11_MODULE(_lowlux, module) {

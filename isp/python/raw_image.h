@@ -40,4 +40,10 @@ RawImagePtr frame_from_array(const pybind11::array& mosaic, const MosaicFigures&
 /// Adds RawImage, read_raw, write_dng and frame_from_array.
 void add_raw_image(pybind11::module_& module);
 
+/// Returns a frame with everything but the samples.
+RawFrame without_samples(const RawFrame& frame);
+
+/// Returns a complete copy.
+RawFrame clone(const RawFrame& frame);
+
 }  // namespace lowlux::python

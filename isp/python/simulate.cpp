@@ -1,5 +1,3 @@
-#include "isp/python/simulate.h"
-
 #include <algorithm>
 #include <optional>
 #include <thread>
@@ -12,6 +10,7 @@
 #include "isp/cli/simulate/simulate_files.h"
 #include "isp/cli/simulate/simulate_work.h"
 #include "isp/python/call.h"
+#include "isp/python/module.h"
 #include "isp/python/picture_argument.h"
 #include "isp/python/text.h"
 
