@@ -1,5 +1,3 @@
-#include "isp/gstreamer/lowlux_isp.h"
-
 #include <algorithm>
 #include <array>
 #include <new>
@@ -7,6 +5,7 @@
 #include <string>
 
 #include <gst/base/gstbasetransform.h>
+#include <gst/gst.h>
 #include <gst/video/gstvideopool.h>
 #include <gst/video/video.h>
 
@@ -323,8 +322,7 @@ void init_element(GTypeInstance* instance, gpointer /*any_class*/) {
   gst_base_transform_set_qos_enabled(reinterpret_cast<GstBaseTransform*>(instance), TRUE);
 }
 
-}  // namespace
-
+/// Returns the type of the element `lowluxisp`: raw frames of a sensor to pictures, or to mosaics without noise.
 GType lowlux_isp_type() {
   static const GType type =
       g_type_register_static_simple(GST_TYPE_BASE_TRANSFORM, "GstLowluxIsp", sizeof(ElementClass), init_class,
@@ -332,4 +330,13 @@ GType lowlux_isp_type() {
   return type;
 }
 
+gboolean add_elements(GstPlugin* plugin) {
+  return gst_element_register(plugin, "lowluxisp", GST_RANK_NONE, lowlux_isp_type());
+}
+
+}  // namespace
 }  // namespace lowlux::gst
+
+#define PACKAGE "lowlux"
+GST_PLUGIN_DEFINE(GST_VERSION_MAJOR, GST_VERSION_MINOR, lowlux, "A camera ISP for low light", lowlux::gst::add_elements,
+                  LOWLUX_VERSION, "BSD", "lowlux", "lowlux")
