@@ -65,10 +65,8 @@ void add_drops(PlaneView<const float> differences, BayerPhase phase, const Motio
     std::vector<float> weight(static_cast<std::size_t>(width));
     for (int y = band.first; y < band.last; ++y) {
       const DropRows::Row& row = rows.row(y);
-      for (int first = 0; first < 2; ++first) {
-        const float mean_of_colour = mean_weight[colour_index(phase, first, y)];
-        for (int x = first; x < width; x += 2) weight[x] = row.weight[x] / mean_of_colour;
-      }
+      const float even = 1 / mean_weight[colour_index(phase, 0, y)], odd = 1 / mean_weight[colour_index(phase, 1, y)];
+      for (int x = 0; x < width; ++x) weight[x] = row.weight[x] * (x % 2 == 0 ? even : odd);
       mean.add_row(y, {.value = row.value.data(), .weight = weight.data(), .site_weight = row_of(part.site_weight, y)},
                    part.block_matches);
     }

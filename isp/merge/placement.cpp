@@ -47,10 +47,9 @@ rows::Samples of_colour(const RgbView<const float>& rgb, BayerPhase phase, int x
 /// Adds P(p) to a row of differences; nothing without a prediction.
 void add_prediction(const RgbView<const float>& prediction, BayerPhase phase, int y, std::span<float> row) {
   if (prediction[0].data == nullptr) return;
-  for (int first = 0; first < 2; ++first) {
-    const float* const predicted = prediction[static_cast<std::size_t>(colour_at(phase, first, y))].row(y);
-    for (auto x = static_cast<std::size_t>(first); x < row.size(); x += 2) row[x] += predicted[x];
-  }
+  const float* const even = prediction[static_cast<std::size_t>(colour_at(phase, 0, y))].row(y);
+  const float* const odd = prediction[static_cast<std::size_t>(colour_at(phase, 1, y))].row(y);
+  for (std::size_t x = 0; x < row.size(); ++x) row[x] += x % 2 == 0 ? even[x] : odd[x];
 }
 
 /// Returns where the content of a frame's sites lies in the reference: what is at q of the frame is at q + at(q) there.
@@ -122,11 +121,11 @@ const DropRows::Row& DropRows::row(int y) {
   rows::drop_row({samples_of(differences_), red_column(phase_), red_row(phase_)}, displaced(motion_, y, dx_px_, dy_px_),
                  radius_, row_.value.data(), row_.weight.data());
   add_prediction(prediction_, phase_, y, row_.value);
-  for (int first = 0; first < 2; ++first) {
-    const bool green = colour_at(phase_, first, y) == CfaColour::green;
-    const float per_mean = static_cast<float>(green ? 2 : 4) / (radius_ * radius_);
-    for (auto x = static_cast<std::size_t>(first); x < row_.weight.size(); x += 2) row_.weight[x] *= per_mean;
-  }
+  const auto per_mean = [&](int x) {
+    return (colour_at(phase_, x, y) == CfaColour::green ? 2.0F : 4.0F) / (radius_ * radius_);
+  };
+  const float even = per_mean(0), odd = per_mean(1);
+  for (std::size_t x = 0; x < row_.weight.size(); ++x) row_.weight[x] *= x % 2 == 0 ? even : odd;
   return row_;
 }
 

@@ -57,13 +57,13 @@ Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptio
                     ? "X-Trans is not merged: frames are aligned and averaged by the 2 x 2 sites of a Bayer mosaic"
                     : "the frame is already demosaiced: frames are aligned and averaged by the sites of their mosaic");
   }
-  Result<DevelopPlan> plan = plan_develop(frame, without_rendering(options, denoise::Level::draft), executor);
+  RawElectrons charge;
+  Result<DevelopPlan> plan = plan_develop(frame, without_rendering(options, denoise::Level::draft), executor, &charge);
   if (!plan) return tl::make_unexpected(std::move(plan.error()));
   FrameElectrons out{.phase = frame.raw.phase, .warnings = std::move(plan->warnings)};
   describe_noise(frame, *plan, out);
   const std::vector<Pixel> defects = std::exchange(plan->levels.defects, {});
-  RawElectrons charge = raw_electrons(frame, plan->levels, executor);
-  subtract_lines(plan->noise_reduction.lines, {0, 0, charge.value.width(), charge.value.height()}, charge.value.view());
+  if (charge.value.empty()) charge = raw_electrons(frame, plan->levels, executor);
   out.signal_e = subtract_dark(std::move(charge), plan->levels.black, executor).value;
   for (const Pixel& defect : defects) out.signal_e.at(defect.x, defect.y) = std::numeric_limits<float>::quiet_NaN();
   return out;

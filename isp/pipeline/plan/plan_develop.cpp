@@ -100,7 +100,8 @@ Result<BlackPoint> choose_black_point(const RawFrame& frame, const DevelopOption
   return options.dark_frame ? black_of(frame.raw, *options.dark_frame) : choose_black_by_gain(frame, options.black);
 }
 
-Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor,
+                                 RawElectrons* charge) {
   if (const Result<void> checked = check(frame, options); !checked) return tl::make_unexpected(checked.error());
   const PictureSize size = picture_size(frame.raw, options);
   DevelopPlan plan{.options = options, .display = options.display, .width = size.width, .height = size.height};
@@ -160,7 +161,7 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
     if (plan.effects->level_decided) request.level.emplace(DecidedLevel{plan.effects->level, plan.effects->regions});
     request.lines = plan.effects->lines;
   }
-  Result<NoiseReduction> noise = plan_noise(frame, thumbnail, *levels, request, executor);
+  Result<NoiseReduction> noise = plan_noise(frame, thumbnail, *levels, request, executor, charge);
   if (!noise) return tl::make_unexpected(std::move(noise.error()));
   append(plan.warnings, noise->warnings);
   if (rendering->look && rendering->look->noise_limit && !rendering->look->noise && !noise->has_level()) {

@@ -20,6 +20,9 @@ Result<BlackPoint> choose_black_point(const RawFrame& frame, const DevelopOption
 /// is measured after it is subtracted. Errors: no black point (insufficient), those of black_of, no colour calibration
 /// for a space other than `camera` (insufficient), white not above black, invalid matrices (malformed), options that do
 /// not fit together or the frame (invalid_argument), those of plan_look and plan_noise.
-Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
+/// @param charge  receives the charge of the frame without its lines, if it was computed as a whole to measure them;
+///                may be null
+Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor,
+                                 RawElectrons* charge = nullptr);
 
 }  // namespace lowlux::isp

@@ -106,22 +106,18 @@ NoiseReduction left_alone(const RawFrame& frame, std::string reason) {
   return out;
 }
 
-/// Returns the charge to check: lines need the whole frame; the remaining noise is checked on a sample of it where
-/// there is one.
-/// @param squares  of the sample; empty: there is none
-RawElectrons charge_to_check(const RawFrame& frame, const RawLevels& levels, std::span<const Rect> squares,
-                             bool with_lines, NoiseReduction& out, Executor& executor) {
-  if (!with_lines && !squares.empty()) return sample_electrons(frame, levels, squares, executor);
-  RawElectrons charge = raw_electrons(frame, levels, executor);
-  if (with_lines) subtract_measured_lines(frame, charge, out, executor);
-  return squares.empty() ? std::move(charge) : sample_of(charge, squares);
-}
-
-/// Measures lines if requested, and compares the noise with its model.
+/// Measures lines if requested, and compares the noise with its model. Lines need the charge of the whole frame, which
+/// is returned in `whole` then; the remaining noise is checked on a sample of it where there is one.
 denoise::NoiseCheck check_frame(const RawFrame& frame, const RawLevels& levels, bool with_lines, NoiseReduction& out,
-                                Executor& executor) {
+                                RawElectrons& whole, Executor& executor) {
   const std::vector<Rect> squares = sample_squares(frame, levels);
-  const RawElectrons charge = charge_to_check(frame, levels, squares, with_lines, out, executor);
+  if (with_lines || squares.empty()) whole = raw_electrons(frame, levels, executor);
+  if (with_lines) subtract_measured_lines(frame, whole, out, executor);
+  RawElectrons sample;
+  if (!squares.empty()) {
+    sample = with_lines ? sample_of(whole, squares) : sample_electrons(frame, levels, squares, executor);
+  }
+  const RawElectrons& charge = squares.empty() ? whole : sample;
   NoiseRatioView ratio = view_of(frame.noise_ratio.get());
   NoiseRatio of_sample;
   if (frame.noise_ratio && !squares.empty()) {
@@ -171,7 +167,7 @@ double middle_snr(const RawFrame& frame, const RawLevels& levels, const denoise:
 }
 
 Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, const RawLevels& levels,
-                                  const NoiseRequest& request, Executor& executor) {
+                                  const NoiseRequest& request, Executor& executor, RawElectrons* charge) {
   const DenoiseChoice& choice = request.choice;
   if (choice.mode == DenoiseChoice::Mode::off) return left_alone(frame, "not asked for");
   if (auto error = noise_obstacle(frame, levels)) {
@@ -192,7 +188,10 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   if (!out.level) return out;
   out.options.level = *out.level;
   if (choice.unbiased_chroma) out.options.rho = std::numeric_limits<double>::infinity();
-  const denoise::NoiseCheck check = check_frame(frame, levels, choice.line_noise && request.lines, out, executor);
+  RawElectrons whole;
+  const bool with_lines = choice.line_noise && request.lines;
+  const denoise::NoiseCheck check = check_frame(frame, levels, with_lines, out, whole, executor);
+  if (charge != nullptr) *charge = std::move(whole);
   add_remarks(check, *frame.noise, out.warnings);
   out.options.variance_scale = denoise::variance_scale_of(check);
   return out;

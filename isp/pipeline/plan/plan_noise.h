@@ -30,8 +30,9 @@ bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise&
 
 /// Decides how noise is reduced. Errors for a requested level: those of noise_obstacle. For an automatic level these
 /// are reasons to leave the noise.
+/// @param charge  as plan_develop has it; may be null
 Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbnail, const RawLevels& levels,
-                                  const NoiseRequest& request, Executor& executor);
+                                  const NoiseRequest& request, Executor& executor, RawElectrons* charge);
 
 // Steps of plan_noise that allocate nothing.
 
