@@ -9,13 +9,14 @@
 namespace lowlux::isp {
 
 Result<Developed> develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
-  Result<DevelopPlan> plan = plan_develop(frame, options, executor);
+  RawElectrons charge;
+  Result<DevelopPlan> plan = plan_develop(frame, options, executor, &charge);
   if (!plan) return tl::make_unexpected(std::move(plan.error()));
   Developed out{Picture{}, std::move(*plan), {}, {}};
   StageClock clock(out.plan.times);
   out.picture = make_picture(out.plan);
   Pipeline pipeline(executor);
-  pipeline.render(frame, out.plan, out.picture);
+  pipeline.render(frame, out.plan, out.picture, std::move(charge));
   if (options.denoise.maps) out.noise_maps = pipeline.take_noise_maps();
   if (auto map = pipeline.take_seeing_map()) {
     out.seeing_map = std::move(map->probability);

@@ -38,11 +38,12 @@ double dark_noise(const DevelopPlan& plan) {
   return noise;
 }
 
-void clean_mosaic(const RawFrame& frame, CleanRaw& out, StageClock& clock, Executor& executor) {
+void clean_mosaic(const RawFrame& frame, RawElectrons charge, CleanRaw& out, StageClock& clock, Executor& executor) {
   const NoiseReduction& how = out.plan.noise_reduction;
   const PerSite<double> light_e = light_at_white_e(out.plan.levels);
   const Region whole = whole_frame(frame.raw);
   SignalStages stages(executor);
+  stages.set_charge(std::move(charge.value));
   stages.reserve(size_of(whole), how);
   const SignalElectronsView signal = stages.electrons(frame, out.plan, whole, &out.maps);
   clock.lap("denoise");
@@ -116,7 +117,8 @@ void clean_pixels(const RawFrame& frame, CleanRaw& out, StageClock& clock, Execu
 }  // namespace
 
 Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
-  Result<DevelopPlan> plan = plan_develop(frame, options, executor);
+  RawElectrons charge;
+  Result<DevelopPlan> plan = plan_develop(frame, options, executor, &charge);
   if (!plan) return tl::make_unexpected(std::move(plan.error()));
   if (!plan->noise_reduction.has_level()) return fail(ErrorCode::insufficient, plan->noise_reduction.reason);
   CleanRaw out;
@@ -127,7 +129,7 @@ Result<CleanRaw> clean_raw(const RawFrame& frame, const DevelopOptions& options,
   out.frame.corrections.defects.clear();
   out.frame.source_tags = frame.source_tags;
   if (is_mosaic(frame.raw)) {
-    clean_mosaic(frame, out, clock, executor);
+    clean_mosaic(frame, std::move(charge), out, clock, executor);
   } else {
     clean_pixels(frame, out, clock, executor);
   }

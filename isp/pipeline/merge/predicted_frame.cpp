@@ -35,13 +35,15 @@ Result<CameraRgb> predicted(RawFrame& frame, const DevelopOptions& options, cons
     frame.raw = std::move(whole.raw);
     frame.raw.default_crop = crop;
   };
-  Result<DevelopPlan> plan = plan_develop(whole, without_rendering(options, denoise::Level::standard), executor);
+  RawElectrons charge;
+  Result<DevelopPlan> plan =
+      plan_develop(whole, without_rendering(options, denoise::Level::standard), executor, &charge);
   if (!plan) {
     give_back();
     return tl::make_unexpected(std::move(plan.error()));
   }
   Picture picture = make_picture(*plan);
-  Pipeline(executor, limits).render(whole, *plan, picture);
+  Pipeline(executor, limits).render(whole, *plan, picture, std::move(charge));
   give_back();
   CameraRgb out;
   out.plane = std::move(std::get<SceneLinear>(picture).plane);

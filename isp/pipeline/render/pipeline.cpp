@@ -158,7 +158,9 @@ void Pipeline::render_shrunk(const RawFrame& frame, const DevelopPlan& plan, Pic
          view_of(out), executor_);
 }
 
-void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out) {
+void Pipeline::render(const RawFrame& frame, const DevelopPlan& plan, Picture& out, RawElectrons charge) {
+  if (is_tiled(frame.raw, plan, limits_)) charge = {};  // each tile computes its own
+  signal_.set_charge(std::move(charge.value));
   if (!plan.framing) return render_unframed(frame, plan, out);
   if (plan.framing->shrinks()) return render_shrunk(frame, plan, out);
   Picture all = make_picture(plan.options.samples, plan.width, plan.height);

@@ -1,5 +1,7 @@
 #include "isp/pipeline/render/signal_stages.h"
 
+#include <utility>
+
 #include "isp/pipeline/render/electron_mosaic.h"
 #include "isp/pipeline/render/map_views.h"
 #include "isp/pipeline/render/pixel_cells.h"
@@ -25,11 +27,19 @@ void SignalStages::reserve_tiles(const RegionSize& largest, const NoiseReduction
   noise_reducer_.reserve_pieces(largest.mosaic_width, largest.mosaic_height, how);
 }
 
+void SignalStages::set_charge(Plane<float> charge_e) {
+  has_charge_ = !charge_e.empty();
+  if (has_charge_) raw_ = std::move(charge_e);
+}
+
 SignalElectronsView SignalStages::electrons(const RawFrame& frame, const DevelopPlan& plan, const Region& region,
                                             NoiseMaps* maps) {
   const NoiseReduction& how = plan.noise_reduction;
   raw_e_ = corner_of(raw_, region.mosaic);
-  raw_electrons(frame, plan.levels, region.mosaic, raw_e_, executor_);
+  if (!std::exchange(has_charge_, false)) {
+    raw_electrons(frame, plan.levels, region.mosaic, raw_e_, executor_);
+    subtract_lines(how.lines, region.mosaic, raw_e_);
+  }
   if (how.reduces()) return reduce_noise(frame, how, region, maps);
   subtract_dark(raw_e_, plan.levels.black.dark_mean_e, executor_);
   return {raw_e_, frame.raw.phase};
@@ -44,7 +54,6 @@ SignalElectronsView SignalStages::reduce_noise(const RawFrame& frame, const Nois
     fit(*maps, active.width, active.height);
     views = views_of(*maps);
   }
-  subtract_lines(how.lines, region.mosaic, raw_e_);
   noise_reducer_.run({region.signal, region.mosaic, active.width, active.height, frame.raw.phase}, how, raw_e_,
                      signal_e, views);
   return {signal_e, frame.raw.phase};

@@ -25,6 +25,10 @@ class SignalStages {
   /// Allocates that of noise reduction, too, for tiles of up to that size.
   void reserve_tiles(const RegionSize& largest, const NoiseReduction& how);
 
+  /// States the charge of the whole frame that electrons() processes next, dark charge included, without lines: as
+  /// plan_develop returns it. It is then not computed again. An empty plane states nothing.
+  void set_charge(Plane<float> charge_e);
+
   /// Returns the mosaic of a region of a Bayer frame, in which the sites of Region::signal are set.
   /// @param maps  of the active area, filled where not null
   /// Precondition: plan.levels.electrons_at_white; maps are null, or the region is the whole frame.
@@ -52,8 +56,9 @@ class SignalStages {
   Executor& executor_;
   NoiseReducer noise_reducer_;
   PixelNoiseReducer pixel_reducer_;
-  Plane<float> raw_;     // mosaic of a region before noise reduction
-  Plane<float> signal_;  // after it
+  Plane<float> raw_;         // mosaic of a region before noise reduction
+  bool has_charge_ = false;  // raw_ holds the charge that was set
+  Plane<float> signal_;      // after it
   PlaneView<float> raw_e_;
   std::array<Plane<float>, 3> planes_;  // planes of frames that are not mosaics
 };
