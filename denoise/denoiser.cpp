@@ -341,6 +341,11 @@ std::size_t Denoiser::bytes(int max_width, int max_height, int threads, Level mo
   return FrameMemory::bytes(max_width, max_height, threads, most == Level::best);
 }
 
+PlaneView<float> Denoiser::result_memory(int width, int height) const {
+  assert((width + 1) / 2 <= state_->memory.columns && (height + 1) / 2 <= state_->memory.rows);
+  return state_->memory.mosaic(width, height);
+}
+
 void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const DenoiseOptions& options,
                    PlaneView<float> signal_e, const DenoiseMaps& maps, Executor& executor) {
   assert(raw.value.width >= 2 && raw.value.height >= 2);

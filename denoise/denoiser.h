@@ -31,9 +31,14 @@ class Denoiser {
 
   /// Denoises one frame.
   /// @param raw  at least 2 x 2 pixels; any phase, odd sizes too
-  /// @param signal_e  as large as `raw`; denoised, dark subtracted, signed [e-]. May not overlap `raw`.
+  /// @param signal_e  as large as `raw`; denoised, dark subtracted, signed [e-]. May not overlap `raw`. May be
+  /// result_memory().
   void run(const RawElectronsView& raw, const RawNoise& noise, const DenoiseOptions& options, PlaneView<float> signal_e,
            const DenoiseMaps& maps, Executor& executor);
+
+  /// Returns memory of the denoiser itself for the result of a mosaic of width x height pixels, which saves a caller 4
+  /// bytes for each pixel. It holds the result until the next frame.
+  PlaneView<float> result_memory(int width, int height) const;
 
  private:
   struct State;

@@ -118,6 +118,11 @@ struct FrameMemory : FrameLayout {
   FrameMemory(int max_width, int max_height, int threads, bool best);
   /// Returns the number of bytes that one FrameMemory takes.
   static std::size_t bytes(int max_width, int max_height, int threads, bool best);
+  /// Returns a mosaic in the memory of the noisy planes of level 0, which are not needed once all passes are done.
+  PlaneView<float> mosaic(int width, int height) const {
+    const PlaneSet& planes = level[0].noisy;
+    return {planes.plane[0], width, height, 2 * planes.stride};
+  }
 
   Plane<std::uint8_t> sources;            // cells that hold point sources
   Plane<std::uint8_t> saturated;          // cells of level 0 that hold saturated sites: 1

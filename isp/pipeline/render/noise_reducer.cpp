@@ -150,6 +150,12 @@ void NoiseReducer::reserve_pieces(int width, int height, const NoiseReduction& h
   if (how.has_level()) reserve_level(width, height, max_level_of(how));
 }
 
+PlaneView<float> NoiseReducer::result_memory(int width, int height, const NoiseReduction& how) {
+  assert(has_result_memory(how));
+  reserve_level(width, height, *how.level);
+  return denoiser_->result_memory(width, height);
+}
+
 void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const NoiseReduction& how,
                                PlaneView<const float> raw_e, PlaneView<float> signal_e,
                                const denoise::DenoiseMaps& maps) {

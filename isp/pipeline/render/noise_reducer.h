@@ -36,7 +36,7 @@ class NoiseReducer {
   /// Reduces the noise of a tile of a frame, or of all of it. Where regions differ, each rectangle with a level is
   /// reduced with a margin of its own, and the others keep their noise.
   /// @param raw_e     the padded tile, without the lines of `how`
-  /// @param signal_e  as large; the core is set
+  /// @param signal_e  as large; the core is set; may be result_memory()
   /// @param maps      of the cells of the padded tile, those of the core are set; none if they are not wanted
   /// Precondition: how.reduces(); with previous frames, the piece is the whole frame.
   void run(const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e, PlaneView<float> signal_e,
@@ -48,6 +48,12 @@ class NoiseReducer {
   static std::size_t maps_bytes(int width, int height);
   /// Allocates memory for tiles of up to width x height pixels, so that later ones need none.
   void reserve_pieces(int width, int height, const NoiseReduction& how);
+
+  /// Returns whether the result of every tile can lie in result_memory(): all of the frame has one level.
+  static bool has_result_memory(const NoiseReduction& how) { return how.has_level() && !how.regions; }
+  /// Returns memory of the denoiser for the result of a padded tile of width x height pixels, valid until the next
+  /// tile. Precondition: has_result_memory().
+  PlaneView<float> result_memory(int width, int height, const NoiseReduction& how);
 
   /// Returns the fraction of the blocks that moved in the last frame; 0 where no previous frames took part.
   double moved() const { return moved_; }

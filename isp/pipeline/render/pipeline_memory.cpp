@@ -34,7 +34,8 @@ std::size_t whole_frame_bytes(const RawDn& raw, const DevelopPlan& plan, int thr
   if (!plan.noise_reduction.reduces()) return out;
   const bool maps = keeps_maps(plan);
   if (maps) out += NoiseReducer::maps_bytes(width, height);
-  return out + plane + NoiseReducer::bytes(width, height, plan.noise_reduction, maps, threads);
+  if (!NoiseReducer::has_result_memory(plan.noise_reduction)) out += plane;
+  return out + NoiseReducer::bytes(width, height, plan.noise_reduction, maps, threads);
 }
 
 std::size_t tiles_bytes(const RawDn& raw, const DevelopPlan& plan, int threads, const TileLimits& limits) {
@@ -44,7 +45,7 @@ std::size_t tiles_bytes(const RawDn& raw, const DevelopPlan& plan, int threads, 
   const NoiseReduction& how = plan.noise_reduction;
   std::size_t out = mosaic + RawToRgb::bytes(size.seen_width, threads);
   if (how.reduces()) {
-    out += (how.regions ? 2 : 1) * mosaic +
+    out += (NoiseReducer::has_result_memory(how) ? 0 : 2) * mosaic +
            denoise::Denoiser::bytes(size.mosaic_width, size.mosaic_height, threads, max_level_of(how));
   }
   if (plan.rendering.profile) out += 3 * sizeof(float) * seen / (plan.options.half ? 4 : 1);

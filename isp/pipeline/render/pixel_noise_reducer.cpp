@@ -55,7 +55,7 @@ std::size_t PixelNoiseReducer::bytes(const RawDn& raw, const NoiseReduction& how
   const TileSize tile = largest_tile(grid, margin_of(*how.level), 2 * width, 2 * height);
   const std::size_t cells = static_cast<std::size_t>(tile.width) * static_cast<std::size_t>(tile.height);
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  return sizeof(float) * (2 * cells + static_cast<std::size_t>(planes_of(raw)) * pixels) +
+  return sizeof(float) * (cells + static_cast<std::size_t>(planes_of(raw)) * pixels) +
          denoise::Denoiser::bytes(tile.width, tile.height, threads, *how.level);
 }
 
@@ -67,7 +67,6 @@ void PixelNoiseReducer::run(std::span<Plane<float>> planes, const NoiseReduction
   const TileMargin margin = margin_of(*how.level);
   const TileSize most = largest_tile(grid, margin, width, height);
   fit(cells_, most.width, most.height);
-  fit(clean_cells_, most.width, most.height);
   Frame frame{planes, view_of(how.noise_ratio.get()), in_sites(how), {}};
   if (maps != nullptr) {
     fit(tile_maps_, most.width, most.height);
@@ -97,7 +96,7 @@ void PixelNoiseReducer::reduce_tile(const Frame& frame, const NoiseReducer::Piec
     clean[c] = clean_[c].view().crop(to.x, to.y, to.width, to.height);
   }
   const PlaneView<float> in = cells_.view().crop(0, 0, whole.width, whole.height);
-  const PlaneView<float> out = clean_cells_.view().crop(0, 0, whole.width, whole.height);
+  const PlaneView<float> out = noise.result_memory(whole.width, whole.height, how);
   CellCharge charge{
       .cell_e = *how.cell_e, .noise_ratio = frame.noise_ratio.from(from.x, from.y), .x = from.x, .y = from.y};
   if (count == 3) charge.half_variance_e2 = how.noise.variance_e2[1];

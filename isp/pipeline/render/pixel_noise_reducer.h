@@ -47,9 +47,8 @@ class PixelNoiseReducer {
   Executor& executor_;
   int side_px_;
   std::array<Plane<float>, 3> clean_;
-  Plane<float> cells_;        // cells of a tile and its margin
-  Plane<float> clean_cells_;  // likewise
-  NoiseMaps tile_maps_;       // likewise, where maps are wanted
+  Plane<float> cells_;   // cells of a tile and its margin
+  NoiseMaps tile_maps_;  // likewise, where maps are wanted
 };
 
 /// Scales the residual variance of maps from the sites of cells to pixels [e-^2]: that of white-balanced luma

@@ -19,7 +19,9 @@ PlaneView<float> corner_of(Plane<float>& plane, const Rect& region) {
 
 void SignalStages::reserve(const RegionSize& largest, const NoiseReduction& how) {
   fit(raw_, largest.mosaic_width, largest.mosaic_height);
-  if (how.reduces()) fit(signal_, largest.mosaic_width, largest.mosaic_height);
+  if (how.reduces() && !NoiseReducer::has_result_memory(how)) {
+    fit(signal_, largest.mosaic_width, largest.mosaic_height);
+  }
 }
 
 void SignalStages::reserve_tiles(const RegionSize& largest, const NoiseReduction& how) {
@@ -48,7 +50,9 @@ SignalElectronsView SignalStages::electrons(const RawFrame& frame, const Develop
 SignalElectronsView SignalStages::reduce_noise(const RawFrame& frame, const NoiseReduction& how, const Region& region,
                                                NoiseMaps* maps) {
   const Rect& active = frame.raw.active;
-  const PlaneView<float> signal_e = corner_of(signal_, region.mosaic);
+  const PlaneView<float> signal_e = NoiseReducer::has_result_memory(how)
+                                        ? noise_reducer_.result_memory(region.mosaic.width, region.mosaic.height, how)
+                                        : corner_of(signal_, region.mosaic);
   denoise::DenoiseMaps views;
   if (maps != nullptr) {
     fit(*maps, active.width, active.height);

@@ -58,7 +58,7 @@ class SignalStages {
   PixelNoiseReducer pixel_reducer_;
   Plane<float> raw_;         // mosaic of a region before noise reduction
   bool has_charge_ = false;  // raw_ holds the charge that was set
-  Plane<float> signal_;      // after it
+  Plane<float> signal_;      // after it, unless the result lies in the memory of noise_reducer_
   PlaneView<float> raw_e_;
   std::array<Plane<float>, 3> planes_;  // planes of frames that are not mosaics
 };
