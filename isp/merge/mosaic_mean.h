@@ -37,6 +37,12 @@ class MosaicMean {
   /// Adds a mosaic with the weight 1, as for frames of equal noise.
   void add(PlaneView<const float> mosaic, PlaneView<const std::uint8_t> block_matches, Executor& executor);
 
+  /// Replaces everything that was added to a site; with a weight of 0 it has no value.
+  void replace(int x, int y, float value, float weight) {
+    sum_.at(x, y) = weight * value;
+    weight_.at(x, y) = weight;
+  }
+
   /// Returns the sum of the weights of each site: 1 / weight is the variance of the mean over that of one sample, or
   /// the variance itself where site weights are inverse variances.
   const Plane<float>& weight() const { return weight_; }

@@ -3,6 +3,7 @@
 #include "isp/base/executor.h"
 #include "isp/base/plane.h"
 #include "isp/merge/frame.h"
+#include "isp/merge/mosaic_mean.h"
 #include "isp/merge/motion.h"
 #include "isp/pipeline/merge/frame_electrons.h"
 
@@ -15,7 +16,7 @@ class BracketFrames {
 
   /// Sets saturated sites of a frame to NaN. @return 1 where a site is saturated, else 0
   Plane<float> remove_saturated(FrameElectrons& frame) const;
-  /// Does the same for the reference, and remembers it as the frame of least light.
+  /// Does the same for the reference, and keeps it as the frame of least light.
   void begin(FrameElectrons& reference);
 
   /// Returns the inverse variance of the frame's values, at the sites of the reference.
@@ -26,17 +27,27 @@ class BracketFrames {
   double measured_light(const merge::FrameView& reference, const FrameElectrons& frame, const merge::Motion& motion,
                         double stated) const;
 
-  /// Remembers which sites are saturated if this frame has less light than all before.
+  /// Keeps the values of a frame, and which are saturated, if it has less light than all before.
   void add(const FrameElectrons& frame, double light, const Plane<float>& saturated, const merge::Motion& motion);
 
-  /// Returns 1 where the frame of least light is saturated, else 0; NaN outside of it.
+  /// Replaces blocks that lack values by those of the frame of least light: the reference is saturated there, and the
+  /// others do not match it, because something moved. All sites of a block then show the scene of one frame: colours
+  /// would be wrong if some were of the reference, and others of another frame.
+  void fill_unmatched(merge::MosaicMean& mean) const;
+
+  /// Returns 1 where the frame of least light is saturated, or where it has no site and the reference is; else 0.
   PlaneView<const float> saturated() const { return saturated_.view(); }
 
  private:
+  /// Returns whether a block has sites without a value at which the frame of least light has one.
+  bool lacks_values(const merge::MosaicMean& mean, int left, int top) const;
+
   int width_, height_;
   Executor& executor_;
   Plane<float> saturated_;
+  Plane<float> least_e_;  // values of the frame of least light, in its own light; NaN where it has none
   double least_light_ = 1;
+  PerSite<double> variance_e2_{};  // of that frame without light
 };
 
 }  // namespace lowlux::isp

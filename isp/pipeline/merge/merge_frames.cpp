@@ -96,6 +96,17 @@ void warn_of_frames_left_out(MergedRaw& out) {
                                          : "their displacement is too uncertain"));
 }
 
+void warn_of_unknown_displacements(MergedRaw& out) {
+  if (out.alignment == MergeAlignment::none) return;
+  const auto unknown =
+      std::ranges::count_if(out.frames, [](const FrameUse& use) { return !use.aligned && use.used_fraction > 0; });
+  if (unknown == 0) return;
+  out.warnings.push_back(
+      fmt::format("the displacement of {} of {} frames could not be found: they were merged where they match the "
+                  "reference in place; another --reference may help",
+                  unknown, out.frames.size()));
+}
+
 void state_times(MergeContext& work) {
   work.clock.lap("codes");
   add_up(work.out.times);
@@ -121,6 +132,7 @@ Result<MergedRaw> merge_frames(int count, const FrameReader& read, const MergeOp
   }
   if (!done) return tl::make_unexpected(done.error());
   warn_of_frames_left_out(work.out);
+  warn_of_unknown_displacements(work.out);
   state_times(work);
   return std::move(work.out);
 }

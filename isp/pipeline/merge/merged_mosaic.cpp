@@ -222,6 +222,8 @@ void encode_merged(merge::MosaicMean& mean, const FrameElectrons& reference, Pla
                                  .signal_at_white_e = site_white_e,
                                  .charge_at_white_e = site_white_e},
                                 frame.raw, levels, executor);
+  // White is that of the frame of least light, and so is the exposure time that luminances are computed with.
+  if (out.bracket && out.frame.raw.info.exposure_s) *out.frame.raw.info.exposure_s *= least_light;
   out.frame.colour = std::move(frame.colour);
   out.frame.corrections = std::move(frame.corrections);
   out.frame.corrections.defects.clear();

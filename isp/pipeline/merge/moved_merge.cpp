@@ -97,6 +97,7 @@ void MovedMerge::encode() {
     return;
   }
   if (has_robust_reference()) work_.fill_unmatched(*mean_);
+  if (bracket_) bracket_->fill_unmatched(*mean_);
   encode_merged(*mean_, work_.reference, bracket_ ? bracket_->saturated() : PlaneView<const float>{}, frame, work_.out,
                 work_.executor);
 }

@@ -55,6 +55,7 @@ TEST(MergeBracket, EightStopsAreUnbiasedAndNearTheBestWeightsAtEveryLevel) {
   EXPECT_EQ(merged.alignment, MergeAlignment::none);
   EXPECT_TRUE(merged.frame.raw.is_float());  // 16 bits would be coarser than the noise
   EXPECT_NEAR(merged.baseline_exposure_ev, 4, 0.05);
+  EXPECT_NEAR(merged.frame.raw.info.exposure_s.value(), 0.1 / 16, 0.05 * 0.1 / 16);  // white is that of the shortest
   const double white_e = 16 * test::night_full_e();
   double bias_chi_square = 0, excess = 0;
   int count = 0;
@@ -119,6 +120,40 @@ TEST(MergeBracket, LampsKeepTheirColourAndWhatSaturatesEverywhereIsWhite) {
   EXPECT_NEAR(sum[2] / count[2], 5000, 100);
   for (int y = 82; y < 88; ++y) {
     for (int x = 82; x < 88; ++x) EXPECT_GE(Burst::signal_e(merged.frame, x, y, white_e), white_e);
+  }
+}
+
+TEST(MergeBracket, WhereSomethingMovedSaturatedBlocksShowOneFrame) {
+  using Rgb = std::array<double, 3>;
+  const Rgb before{20000, 1000, 300}, after{300, 20000, 1000};  // red saturates in the long frame, and nothing after
+  const Rect object{32, 40, 64, 48};
+  Burst burst{.width = 384, .height = 256};
+  burst.light = [](int index) { return std::array{1.0, 1.0 / 16}[static_cast<std::size_t>(index)]; };
+  const auto is_inside = [&](double x, double y) {
+    return x >= object.x && x < object.x + object.width && y >= object.y && y < object.y + object.height;
+  };
+  burst.scene = [&](double x, double y, int colour) {
+    return is_inside(x, y) ? before[static_cast<std::size_t>(colour)] : test::textured(x, y, colour, 400);
+  };
+  burst.disturb = [&](RawFrame& frame, int index) {
+    if (index == 0) return;
+    for (int y = object.y; y < object.y + object.height; ++y) {
+      for (int x = object.x; x < object.x + object.width; ++x) {
+        const double e = after[static_cast<std::size_t>(colour_at(BayerPhase::grbg, x, y))] / 16;
+        frame.raw.dn.at(x, y) =
+            static_cast<std::uint16_t>(std::lround(test::night_black_dn + test::night_gain_dn_per_e * e));
+      }
+    }
+  };
+  for (const auto alignment : {MergeAlignment::none, MergeAlignment::cells, MergeAlignment::subpixel}) {
+    const MergedRaw merged = burst.merged(2, {.alignment = alignment});
+    const double white_e = test::night_full_e() / merged.frames[1].light;
+    for (int y = object.y + 8; y < object.y + object.height - 8; ++y) {
+      for (int x = object.x + 8; x < object.x + object.width - 8; ++x) {
+        const double expected = after[static_cast<std::size_t>(colour_at(BayerPhase::grbg, x, y))];
+        ASSERT_NEAR(Burst::signal_e(merged.frame, x, y, white_e), expected, 0.05 * expected) << x << ' ' << y;
+      }
+    }
   }
 }
 
