@@ -196,6 +196,29 @@ TEST(ResidualProfile, FindsTheLineItIsGiven) {
   }
 }
 
+TEST(ResidualProfile, IsTheMeanOfVariancesThatScatterAndOfAFewMuchSmallerOnes) {
+  SignalElectrons signal = ramp(200, 64);
+  const PerSite<double> electrons{1000, 1000, 1000, 1000};
+  auto scattered = variances(signal, 0.05, 2);
+  for (auto& plane : scattered) {
+    for (int y = 0; y < plane.height(); ++y) {
+      for (int x = 0; x < plane.width(); ++x) plane.at(x, y) *= (x + y) % 2 == 0 ? 0.2F : 1.8F;
+    }
+  }
+  const auto mean = residual_profile(signal, scattered, electrons, 0);
+  auto with_quiet_row = variances(signal, 0.05, 2);
+  for (auto& plane : with_quiet_row) {
+    for (int x = 0; x < plane.width(); ++x) plane.at(x, 7) *= 1e-4F;
+  }
+  const auto drawn = residual_profile(signal, with_quiet_row, electrons, 0);
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_NEAR(mean.scale[c], 0.05 / 1000, 0.03 * 0.05 / 1000) << c;
+    EXPECT_NEAR(mean.offset[c], 2e-6, 0.1e-6) << c;
+    EXPECT_NEAR(drawn.scale[c], (1 - 1.0 / 32) * 0.05 / 1000, 0.02 * 0.05 / 1000) << c;  // one of 32 rows
+    EXPECT_NEAR(drawn.offset[c], (1 - 1.0 / 32) * 2e-6, 0.1e-6) << c;
+  }
+}
+
 TEST(ResidualProfile, NeverFallsAndNeverStartsBelowZero) {
   SignalElectrons signal = ramp(200, 64);
   const PerSite<double> electrons{1000, 1000, 1000, 1000};

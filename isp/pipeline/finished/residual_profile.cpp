@@ -12,23 +12,28 @@ namespace {
 
 constexpr double min_scale = 1 / max_electrons_at_white;
 constexpr std::int64_t max_cells = 100'000;
+constexpr int fit_rounds = 12;
+constexpr double min_offset_fraction = 0.1;  // of the offset of the round before
 
 struct Sample {
   double x;  // fraction of white
   double variance;
 };
 
-/// Holds a line of weighted least squares, variance = scale x + offset, weights 1 / variance^2: every level counts
-/// alike. Where the line would fall, or start below 0, the best line at that bound is used.
+/// Holds the line, variance = scale x + offset, of the largest likelihood of variances with a gamma distribution of one
+/// relative scatter, which is that of least squares with the weights 1 / line^2: every level counts alike, and a few
+/// samples of little variance do not draw it below all others. Where the line would fall, or start below 0, the best
+/// line at that bound is used.
 struct Line {
   double scale = min_scale;
   double offset = 0;
 };
 
-Line fitted(const std::vector<Sample>& samples) {
+/// Returns the line of least squares with weights by the line `at`.
+Line weighted_fit(const std::vector<Sample>& samples, const Line& at) {
   double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0;
   for (const Sample& s : samples) {
-    const double weight = 1 / (s.variance * s.variance);
+    const double line = at.scale * s.x + at.offset, weight = 1 / (line * line);
     w += weight;
     wx += weight * s.x;
     wy += weight * s.variance;
@@ -42,6 +47,20 @@ Line fitted(const std::vector<Sample>& samples) {
   if (scale >= min_scale && offset >= 0) return {scale, offset};
   if (scale < min_scale) return {min_scale, std::max((wy - min_scale * wx) / w, 0.0)};
   return {std::max(wxy / wxx, min_scale), 0};
+}
+
+Line fitted(const std::vector<Sample>& samples) {
+  double sum = 0;
+  for (const Sample& s : samples) sum += s.variance;
+  if (!(sum > 0)) return {};
+  Line out{.scale = 0, .offset = sum / static_cast<double>(samples.size())};
+  for (int i = 0; i < fit_rounds; ++i) {
+    Line next = weighted_fit(samples, out);
+    // An offset of 0 would give samples without light all the weight.
+    next.offset = std::max(next.offset, min_offset_fraction * out.offset);
+    out = next;
+  }
+  return out;
 }
 
 NoiseProfile profile_of(const std::array<std::vector<Sample>, 3>& samples) {
