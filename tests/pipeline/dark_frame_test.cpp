@@ -111,6 +111,35 @@ TEST(DevelopWithDarkFrame, PixelsWhoseDarkIsUnknownAreRepairedAndWarningsPassedO
   EXPECT_LT(largest_difference(repaired->picture, sound->picture), 2e-6);
 }
 
+TEST(DevelopWithDarkFrame, TheNoiseOfAFileIsThatAboveItsTaggedBlack) {
+  InlineExecutor executor;
+  for (const double dark_dn : {256.0, 1000.0, 30000.0}) {
+    RawFrame frame = scene(SensorLayout::bayer);
+    frame.raw.black_tag = BlackLevel{.pattern_dn = {256}};
+    const double white_dn = frame.raw.white_dn[1], gain_dn_per_e = 2, read_dn = 5;
+    const double range_dn = white_dn - 256;
+    for (std::size_t c = 0; c < 3; ++c) frame.raw.white_dn[c] = white_dn;
+    const double offset = read_dn * read_dn / (range_dn * range_dn), scale = gain_dn_per_e / range_dn;
+    frame.noise = NoiseProfile{.scale = {scale, scale, scale}, .offset = {offset, offset, offset}};
+    DevelopOptions options = camera_float;
+    options.dark_frame = dark_of(dark_dn, false);
+    refer_noise_to_black(frame, options);
+    const auto plan = plan_develop(frame, options, executor);
+    ASSERT_TRUE(plan) << plan.error().message;
+    const NoiseProfile& noise = *frame.noise;
+    for (int site = 0; site < 4; ++site) {
+      const auto colour = static_cast<std::size_t>(colour_at(frame.raw.phase, site & 1, site >> 1));
+      const double electrons = (white_dn - plan->levels.black.pedestal_dn[site]) / gain_dn_per_e;
+      EXPECT_NEAR(1 / noise.scale[colour], electrons, 1e-9 * electrons) << dark_dn;
+      EXPECT_NEAR(noise.offset[colour] * electrons * electrons, std::pow(read_dn / gain_dn_per_e, 2), 1e-9) << dark_dn;
+    }
+    frame.noise->source = NoiseProfile::Source::profile;  // is stated above the black that is subtracted
+    const NoiseProfile before = *frame.noise;
+    refer_noise_to_black(frame, options);
+    EXPECT_EQ(frame.noise->scale, before.scale);
+  }
+}
+
 TEST(DevelopWithDarkFrame, ADarkOfAnotherSizeIsAnError) {
   InlineExecutor executor;
   DevelopOptions options = camera_float;

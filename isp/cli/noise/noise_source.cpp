@@ -18,6 +18,7 @@
 #include "capture/file/file_bytes.h"
 #include "isp/base/sensor.h"
 #include "isp/cli/shared/option_values.h"
+#include "isp/pipeline/plan/plan_develop.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/subtract_dark_frame.h"
 #include "isp/raw/to_linear.h"
@@ -244,6 +245,7 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
   using Mode = isp::DenoiseChoice::Mode;
   const bool is_stated = frame.noise && isp::electrons_at_white(frame.raw, *frame.noise);
   if (!given && is_stated) {
+    isp::refer_noise_to_black(frame, options);
     return NoiseOrigin{.source = source_of(*frame.noise)};
   }
   if (!given && options.denoise.mode == Mode::off) return std::nullopt;

@@ -1,6 +1,7 @@
 #include "isp/pipeline/plan/plan_develop.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <utility>
@@ -98,6 +99,26 @@ Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackReques
 
 Result<BlackPoint> choose_black_point(const RawFrame& frame, const DevelopOptions& options) {
   return options.dark_frame ? black_of(frame.raw, *options.dark_frame) : choose_black_by_gain(frame, options.black);
+}
+
+void refer_noise_to_black(RawFrame& frame, const DevelopOptions& options) {
+  const RawDn& raw = frame.raw;
+  if (!frame.noise || frame.noise->source != NoiseProfile::Source::file) return;
+  const Result<BlackPoint> tagged = choose_black(raw, {.choice = BlackChoice::metadata});
+  const Result<BlackPoint> black = choose_black_point(frame, options);
+  if (!tagged || !black) return;
+  std::array<double, 3> stated_dn{}, range_dn{};
+  for (int site = 0; site < 4; ++site) {
+    const bool is_mosaic = raw.layout == SensorLayout::bayer;
+    const int colour = is_mosaic ? static_cast<int>(colour_at(raw.phase, site & 1, site >> 1)) : std::min(site, 2);
+    stated_dn[colour] += white_at(raw, site) - tagged->pedestal_dn[site];
+    range_dn[colour] += white_at(raw, site) - black->pedestal_dn[site];
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double ratio = stated_dn[c] / range_dn[c];
+    frame.noise->scale[c] *= ratio;
+    frame.noise->offset[c] *= ratio * ratio;
+  }
 }
 
 Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& options, Executor& executor,

@@ -16,6 +16,12 @@ Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackReques
 /// those of choose_black and black_of.
 Result<BlackPoint> choose_black_point(const RawFrame& frame, const DevelopOptions& options);
 
+/// Refers the NoiseProfile of a file, which is stated above its tagged black level (DNG 1.7, NoiseProfile), to the
+/// black point as the options request it: a raw value x of 0..1 stands for another charge if that holds dark charge. To
+/// be called once for a frame that was read. Does nothing for other sources of noise, and where a black level is
+/// missing.
+void refer_noise_to_black(RawFrame& frame, const DevelopOptions& options);
+
 /// Measures black, noise, exposure and white of a frame, and decides how to develop it. With a dark frame, everything
 /// is measured after it is subtracted. Errors: no black point (insufficient), those of black_of, no colour calibration
 /// for a space other than `camera` (insufficient), white not above black, invalid matrices (malformed), options that do
