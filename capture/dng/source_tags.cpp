@@ -143,8 +143,8 @@ constexpr std::array<std::uint16_t, 11> own_exif_tags{33434, 33437, 34665, 34853
                                                       37386, 37888, 40962, 40963, 40965};
 constexpr std::array<TagName, 2> hue_sat_map{{{50938, "ProfileHueSatMapData1"}, {50939, "ProfileHueSatMapData2"}}};
 
-// Author, XMP, copyright, IPTC and Rating.
-constexpr std::array<std::uint16_t, 5> author_tags{315, 700, 18246, 33432, 33723};
+// Caption, author, XMP, copyright, IPTC and Rating.
+constexpr std::array<std::uint16_t, 6> author_tags{270, 315, 700, 18246, 33432, 33723};
 // UniqueCameraModel and LocalizedCameraModel, BayerGreenSplit, BaselineSharpness, CameraSerialNumber, LensInfo,
 // AntiAliasStrength, MakerNoteSafety, OriginalRawFileName, signatures, names, tables and curve of the profile,
 // encodings, BaselineExposureOffset and DefaultBlackRender.

@@ -15,8 +15,8 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr std::uint16_t artist = 315, copyright = 33432, exif_pointer = 34665, gps_pointer = 34853, maker_note = 37500,
-                        unique_camera_model = 50708;
+constexpr std::uint16_t caption = 270, artist = 315, copyright = 33432, exif_pointer = 34665, gps_pointer = 34853,
+                        maker_note = 37500, unique_camera_model = 50708;
 constexpr std::uint16_t type_long = 4;
 constexpr std::size_t entry_bytes = 12, longest_in_picture = 4096;
 constexpr std::size_t most_in_picture = 48 * 1024;  // in all: a JPEG holds 64 KiB of EXIF
@@ -172,8 +172,9 @@ SourceTags picture_tags(const SourceTags& tags) {
     }
   };
   const auto is_short = [](const SourceTag& tag) { return tag.values.size() <= longest_in_picture; };
-  keep(tags.main, out.main,
-       [&](const SourceTag& tag) { return is_short(tag) && (tag.id == artist || tag.id == copyright); });
+  keep(tags.main, out.main, [&](const SourceTag& tag) {
+    return is_short(tag) && (tag.id == caption || tag.id == artist || tag.id == copyright);
+  });
   keep(tags.gps, out.gps, is_short);
   keep(tags.exif, out.exif, [&](const SourceTag& tag) { return is_short(tag) && tag.id != maker_note; });
   return out;

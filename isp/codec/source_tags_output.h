@@ -17,9 +17,9 @@ namespace lowlux::isp {
 /// Errors: unwritable.
 Result<void> add_source_tags(std::FILE* file, const SourceTags& tags);
 
-/// Returns the tags that belong into a finished image: author, copyright, lens, place and how the image was taken, but
-/// no maker's notes, whose offsets do not survive, no tags above 4096 bytes, none of raw developers,
-/// and 48 KiB in all: further ones are left out.
+/// Returns the tags that belong into a finished image: caption, author, copyright, lens, place and how the image was
+/// taken, but no maker's notes, whose offsets do not survive, no tags above 4096 bytes, none of raw developers, and 48
+/// KiB in all: further ones are left out.
 SourceTags picture_tags(const SourceTags& tags);
 
 }  // namespace lowlux::isp

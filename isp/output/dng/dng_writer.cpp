@@ -84,6 +84,29 @@ Result<void> add_tags_of_source(std::FILE* file, const RawFrame& frame) {
   return add_source_tags(file, tags);
 }
 
+/// Returns the caption that the source has in its ImageDescription; empty if there is none or it is blank.
+std::string caption_of(const RawFrame& frame) {
+  constexpr std::uint16_t ascii = 2;
+  if (!frame.source_tags) return {};
+  const auto& tags = frame.source_tags->main;
+  const auto found = std::ranges::find(tags, TIFFTAG_IMAGEDESCRIPTION, &SourceTag::id);
+  if (found == tags.end() || found->type != ascii) return {};
+  std::string text(reinterpret_cast<const char*>(found->values.data()), found->values.size());
+  text.resize(std::min(text.find('\0'), text.size()));
+  text.resize(text.find_last_not_of(' ') + 1);
+  return text;
+}
+
+/// Returns the caption of the source, followed by the processing; empty where add_tags_of_source() is to write the
+/// caption as it is.
+std::string image_description(const RawFrame& frame, const DngWriteOptions& options) {
+  const std::string caption = caption_of(frame), processing = printable_ascii(options.description, longest_description);
+  if (caption.empty()) return processing;
+  const bool is_there = caption.find(processing) != std::string::npos;  // the source was processed alike
+  const bool fits = caption.size() + processing.size() < longest_description;
+  return is_there || !fits ? std::string() : caption + "; " + processing;
+}
+
 void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, const DngWriteOptions& options) {
   constexpr std::array<std::uint8_t, 4> version{1, 4, 0, 0};
   // MaskedAreas came with 1.1; opcodes came with 1.3 and must not be skipped; floating-point samples came with 1.4.
@@ -98,7 +121,7 @@ void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, cons
   // Blank tags mean unknown (EXIF 2.32, 4.6.5.4); RawSpeed, and with it darktable, requires them to be present.
   if (info.make.empty()) TIFFSetField(tiff, TIFFTAG_MAKE, "");
   if (info.model.empty()) TIFFSetField(tiff, TIFFTAG_MODEL, "");
-  const std::string description = printable_ascii(options.description, longest_description);
+  const std::string description = image_description(frame, options);
   if (!description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
 }
 

@@ -13,7 +13,9 @@ namespace lowlux::isp {
 struct DngWriteOptions {
   Overwrite overwrite = Overwrite::no;
   std::string software = "lowlux";  // with its version; replaces the name in the frame
-  std::string description;          // ImageDescription, the processing of the frame; printable ASCII is kept
+  /// Processing of the frame, for ImageDescription: it follows the caption that the source tags have there. Printable
+  /// ASCII is kept.
+  std::string description;
   Sync sync = Sync::no;
   /// By how much raw developers brighten the image by default (BaselineExposure), in addition to what the source
   /// states; the sum is -100 to 100. For a merge of exposures the ratio of the exposure that the image is to have to
