@@ -131,8 +131,60 @@ TEST_F(Batch, AFolderStandsForTheRawFilesInIt) {
   EXPECT_EQ(names_in("clean"), std::vector<std::string>{"a.dng"});
   fs::create_directories(file("empty"));
   refused(lowlux({"develop", file("empty"), "-o", file("out/")}), "no raw files", 1);
-  refused(lowlux({"develop", file("raws"), "-o", file("x.png")}), "2 raw files need a folder");
+  refused(lowlux({"develop", file("raws"), "-o", file("x.png"), "--quiet"}), "2 raw files need a folder");
   refused(lowlux({"develop", file("none*.dng"), "-o", file("out/")}), "no file matches", 1);
+}
+
+TEST_F(Batch, EveryEntryOfAFolderWithTheExtensionOfARawFileIsAnInput) {
+  raw("a.dng");
+  copies("a.dng", {"raws/a.dng", "raws/b.mef", "raws/c.txt"});
+  scratch_.write("raws/c.x3f", "no raw file");
+  scratch_.write("raws/d.GPR", "no raw file");
+  fs::create_symlink("nowhere.nef", file("raws/e.nef"));
+  fs::create_directories(file("raws/f.cr2"));
+  const auto result = lowlux({"develop", file("raws"), "-o", file("out/"), "--json"});
+  EXPECT_EQ(result.exit_code, 1);
+  for (const char* name : {"c.x3f", "d.GPR", "e.nef: no such file", "f.cr2: is a directory"}) {
+    EXPECT_NE(result.err.find(file("raws/") + name), std::string::npos) << name << result.err;
+  }
+  const Json report = Json::parse(result.out);
+  ASSERT_EQ(report.size(), 6U) << result.out;
+  EXPECT_EQ(report[1]["file"], file("raws/b.mef"));
+  EXPECT_EQ(names_in("out"), (std::vector<std::string>{"a.png", "b.png"}));
+}
+
+TEST_F(Batch, RawFilesInSubFoldersAreReportedInOneLine) {
+  raw("a.dng");
+  copies("a.dng", {"raws/a.dng", "raws/first/a.dng", "raws/second/a.dng", "above/second/a.dng"});
+  fs::create_directories(file("raws/empty"));
+  const auto developed = [&](const std::string& folder, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> words{"develop", file(folder), "-o", file("out/"), "--force", "--noise", "1,3"};
+    words.insert(words.end(), more.begin(), more.end());
+    return lowlux(words);
+  };
+  const auto result = developed("raws");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const std::string line = "lowlux: " + file("raws") + ": warning: raw files in sub-folders, such as " +
+                           file("raws/first") + ", are left out";
+  EXPECT_EQ(result.err.find(line), 0U) << result.err;
+  EXPECT_EQ(result.err.find("second"), std::string::npos) << result.err;
+  EXPECT_EQ(names_in("out"), std::vector<std::string>{"a.png"});
+  EXPECT_EQ(developed("raws", {"--quiet"}).err, "");
+  EXPECT_EQ(developed("raws/first").err.find("sub-folder"), std::string::npos);
+  refused(developed("above"), "holds no raw files, its sub-folder " + file("above/second") + " does", 1);
+}
+
+TEST_F(Batch, InfoTakesFolders) {
+  raw("a.dng");
+  copies("a.dng", {"raws/b.dng", "raws/a.dng"});
+  const auto result = lowlux({"info", file("raws"), file("a.dng"), file("none*.dng"), "--json"});
+  EXPECT_EQ(result.exit_code, 1);
+  const Json report = Json::parse(result.out);
+  ASSERT_EQ(report.size(), 4U);
+  EXPECT_EQ(report[0]["file"], file("raws/a.dng"));
+  EXPECT_EQ(report[1]["file"], file("raws/b.dng"));
+  EXPECT_EQ(report[2]["ok"], true);
+  EXPECT_EQ(report[3]["ok"], false);
 }
 
 TEST_F(Batch, ShardsMakeEachFileOnceAsOneRunDoes) {

@@ -132,6 +132,24 @@ TEST_F(Config, LaterErrorsNameTheLineOfTheDefault) {
   EXPECT_FALSE(scratch_.holds("x.exr"));
 }
 
+TEST_F(Config, ADepthThatAFormatDoesNotHoldNamesItsLine) {
+  write("[develop]\nbits = 16\n[retarget]\nbits = 16\n[resaturate]\nbits = 16\n");
+  const std::string image = std::string(LOWLUX_TESTDATA) + "/pictures/kodim15.png";
+  const Words develop{"develop", dog, "-o", file("x.jpg")}, retarget{"retarget", image, "-o", file("x.jpg")},
+      resaturate{"resaturate", image, "-o", file("x.jpg"), "--black", "0,0,0"};
+  int line = 2;
+  for (const Words& words : {develop, retarget, resaturate}) {
+    const auto result = run(words);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_TRUE(
+        holds(result.err, file("lowlux/config") + ":" + std::to_string(line) + ": --bits: JPEG files hold 8 bits"))
+        << result.err;
+    line += 2;
+  }
+  const auto space = run({"develop", dog, "-o", file("x.exr"), "--bits", "32", "--space", "srgb"});
+  EXPECT_TRUE(holds(space.err, "lowlux develop: --space: float pictures are scene-linear")) << space.err;
+}
+
 TEST_F(Config, DoctorNamesUnknownOptionsOfEveryVerb) {
   write("[develop]\nexposre = 1\nquality = 90\n[calibrate black]\nisso = 100\n[info]\njson = yes\n");
   const auto result = run({"doctor"});

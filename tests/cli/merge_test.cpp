@@ -162,6 +162,46 @@ TEST_F(MergeCommand, OptionsOfStarsThatContradictEachOtherAreRefused) {
   refused(frames_, {"--align", "stars"}, 1, "stars were found");
 }
 
+TEST_F(MergeCommand, FramesOfOtherScenesAreReportedInOneLine) {
+  const std::vector<std::string> look{"--size", "192x128", "--no-truth"};
+  simulated("chart:macbeth", "chart.dng", look);
+  simulated("flat", "flat.dng", look);
+  simulated("dark", "dark.dng", look);
+  const auto result = merge({file("flat.dng"), file("dark.dng"), file("chart.dng")}, {"--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string line = "2 of 3 frames match the reference in less than 10 % of the image (" + file("dark.dng") +
+                           ": it differs from the reference by more than noise)";
+  const std::size_t found = result.err.find(line);
+  ASSERT_NE(found, std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find("match the reference", found + line.size()), std::string::npos) << result.err;
+  EXPECT_NE(Json::parse(result.out)["warnings"].dump().find("2 of 3 frames match"), std::string::npos);
+  const auto developed =
+      lowlux({"develop", "--merge", file("flat.dng"), file("dark.dng"), file("chart.dng"), "-o", file("out.png")});
+  EXPECT_NE(developed.err.find(line), std::string::npos) << developed.err;
+  simulated("flat", "odd.dng", {"--size", "192x128", "--no-truth", "--exposure", "0.02"});
+  const auto odd_first = merge({file("odd.dng"), frames_[0], frames_[1], frames_[2]}, {"--force"});
+  EXPECT_NE(
+      odd_first.err.find("1 of 4 frames matches the reference in less than 10 % of the image (" + file("odd.dng")),
+      std::string::npos)
+      << odd_first.err;
+  EXPECT_EQ(merge(frames_, {"--force"}).err, "") << "frames of one scene need no warning";
+}
+
+TEST_F(MergeCommand, ASaturatedFrameOfABracketIsNotTakenForAnotherScene) {
+  const std::vector<std::string> light{"--luminance", "5", "--no-truth", "--exposure"};
+  std::vector<std::string> brief = light, endless = light;
+  brief.emplace_back("0.1");
+  endless.insert(endless.end(), {"10", "--seed", "3"});
+  simulated("flat", "brief.dng", brief);
+  simulated("flat", "endless.dng", endless);
+  const auto result = merge({file("brief.dng"), file("endless.dng")});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("1 of 2 frames matches the reference in less than 10 % of the image (" +
+                            file("endless.dng") + ": no part of it can be compared"),
+            std::string::npos)
+      << result.err;
+}
+
 TEST_F(MergeCommand, RefusesWhatCannotBeMerged) {
   refused({}, {}, 2, "RAW");
   refused({frames_[0], frames_[0]}, {}, 2, "given twice");

@@ -106,5 +106,14 @@ TEST_F(OptionForms, ADecimalCommaGetsTheNumberWithAPoint) {
   }
 }
 
+TEST_F(OptionForms, TheCommaBeforeATintIsNotTakenForADecimalComma) {
+  for (const char* text : {"5000,151", "5000,-151"}) {
+    const auto result = developed("--wb", text);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("with a tint from -150 to 150"), std::string::npos) << result.err;
+    EXPECT_EQ(result.err.find("decimals"), std::string::npos) << result.err;
+  }
+}
+
 }  // namespace
 }  // namespace lowlux

@@ -135,5 +135,45 @@ TEST_F(Usage, AGainSettingIsChosenWhereTheRawStatesNoIso) {
   refused({"develop", dog, "-o", file("x.png"), "--gain-setting", "100"}, "name the profile with --profile");
 }
 
+TEST_F(Usage, AnEmptyValueIsRefused) {
+  for (const char* option : {"--bits", "--gain-setting", "--wb", "--quality", "--jobs", "--profile", "--dark-frame"}) {
+    refused({"develop", dog, "-o", file("x.png"), option, ""}, option);
+  }
+  refused({"develop", dog, "-o", ""}, "--output has no value");
+  for (const char* option : {"--movers", "--masked-columns", "--reduce", "--horizon", "--bits", "--stars", "--light"}) {
+    refused({"simulate", "flat", "-o", file("x.dng"), option, ""}, option);
+  }
+  EXPECT_TRUE(scratch_.names().empty());
+}
+
+TEST_F(Usage, NegativeFiguresOfTheDarkCurrentAreRefusedWithoutADarkCurrentToo) {
+  for (const char* option : {"--dark-activation", "--dark-floor"}) {
+    refused({"simulate", "dark", "-o", file("x.dng"), option, "-1"}, "'-1' is not a number of at least 0");
+    simulated("dark", std::string(option) + ".dng", {option, "0"});
+  }
+}
+
+TEST_F(Usage, WrongNumbersAndRepeatedOptionsAreNamedInPlainWords) {
+  refused({"develop", dog, "-o", file("x.png"), "--bits", "nan"}, "--bits: 'nan' is none of 8, 16, 32;");
+  refused({"develop", dog, "-o", file("x.png"), "--bits", "12"}, "--bits: '12' is none of 8, 16, 32;");
+  refused({"simulate", "flat", "-o", file("x.dng"), "--bits", "nan"}, "--bits: 'nan' is not a whole number;");
+  refused({"develop", dog, "-o", file("x.png"), "--bits", "8", "--bits", "8"}, ": --bits is given more than once;");
+  refused({"develop", dog, "-o", file("x.png"), "--jobs", "1", "--jobs", "2"}, ": --jobs is given more than once;");
+}
+
+TEST_F(Usage, EveryLampIsAddedToTheScene) {
+  const auto with = [&](const Words& lamps) {
+    Words words = lamps;
+    words.insert(words.end(), {"--effects", "none", "--no-truth", "--force"});
+    simulated("flat", "lamps.dng", words);
+    return scratch_.read("lamps.dng");
+  };
+  const Words left{"--lamp", "8,8,D65,100"}, right{"--lamp", "40,8,A,100"};
+  const Words both{left[0], left[1], right[0], right[1]};
+  const std::string two = with(both);
+  EXPECT_NE(two, with(left));
+  EXPECT_NE(two, with(right));
+}
+
 }  // namespace
 }  // namespace lowlux

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "denoise/denoiser.h"
 #include "isp/bench/bench_stages.h"
@@ -119,7 +120,7 @@ int run_calibrate_cost(const BenchArgs& args) {
   const int threads = args.threads > 0 ? args.threads : threads_of_each(1);
   std::string file;
   const auto model = calibrate_cost(threads, args.json, file);
-  if (!model) return print_failure(model.error());
+  if (!model) return print_failure(model.error(), object_if(args.json));
   if (args.json) {
     print_out(fmt::format("{}", cost_text(*model)));
     return exit_done;
@@ -135,17 +136,25 @@ int run_calibrate_cost(const BenchArgs& args) {
   return exit_done;
 }
 
+int list_stages(bool json) {
+  if (json) {
+    auto stages = nlohmann::ordered_json::array();
+    for (const isp::BenchStage& stage : isp::bench_stages())
+      stages.push_back({{"id", stage.id}, {"title", stage.title}});
+    print_out(nlohmann::ordered_json{{"stages", stages}}.dump(2) + "\n");
+    return exit_done;
+  }
+  for (const isp::BenchStage& stage : isp::bench_stages()) print_out(fmt::format("{:<20} {}\n", stage.id, stage.title));
+  return exit_done;
+}
+
 }  // namespace
 
 int run_bench(const std::vector<std::string>& words) {
   const Parsed<BenchArgs> parsed = parse_bench(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<BenchArgs>(parsed);
-  if (args.list) {
-    for (const isp::BenchStage& stage : isp::bench_stages())
-      print_out(fmt::format("{:<20} {}\n", stage.id, stage.title));
-    return exit_done;
-  }
+  if (args.list) return list_stages(args.json);
   if (args.calibrate_cost) return run_calibrate_cost(args);
   const auto to_run = chosen(args);
   if (!to_run) return print_usage_error("bench", to_run.error());
@@ -153,9 +162,11 @@ int run_bench(const std::vector<std::string>& words) {
   auto methods = all_methods(args);
   if (!methods) return print_usage_error("bench", methods.error());
   auto options = bench_options(args);
-  if (!options) return print_failure(options.error());
+  if (!options) return print_failure(options.error(), object_if(args.json));
   options->shard = to_run->lights;
-  if (const auto free = check_bench_files(stages, args); !free) return print_failure(free.error());
+  if (const auto free = check_bench_files(stages, args); !free) {
+    return print_failure(free.error(), object_if(args.json));
+  }
   const std::size_t not_installed = args.methods.size() + denoise::all_levels.size() - methods->size();
   add_methods(*std::move(methods), *options);
   const std::vector<MeasuredStage> measured = run_each(stages, *options, command_line(words));

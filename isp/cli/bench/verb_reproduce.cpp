@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "isp/cli/bench/bench_report.h"
 #include "isp/cli/develop/develop_args.h"
@@ -135,22 +136,31 @@ Result<void> write_all(const std::vector<TextFile>& files, const ReproduceArgs& 
   return {};
 }
 
+int list_experiments(bool json) {
+  if (json) {
+    auto experiments = nlohmann::ordered_json::array();
+    for (const isp::Experiment& e : isp::experiments()) experiments.push_back({{"id", e.id}, {"title", e.title}});
+    print_out(nlohmann::ordered_json{{"experiments", experiments}}.dump(2) + "\n");
+    return exit_done;
+  }
+  for (const isp::Experiment& e : isp::experiments()) print_out(fmt::format("{:<22} {}\n", e.id, e.title));
+  return exit_done;
+}
+
 }  // namespace
 
 int run_reproduce(const std::vector<std::string>& words) {
   const Parsed<ReproduceArgs> parsed = parse_reproduce(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<ReproduceArgs>(parsed);
-  if (args.list) {
-    for (const isp::Experiment& e : isp::experiments()) print_out(fmt::format("{:<22} {}\n", e.id, e.title));
-    return exit_done;
-  }
+  if (args.list) return list_experiments(args.json);
   const auto experiments = chosen_experiments(args.experiments);
   if (!experiments) return print_usage_error("reproduce", experiments.error());
-  if (const auto error = in_the_way(args)) return print_failure(*error);
+  if (const auto error = in_the_way(args)) return print_failure(*error, object_if(args.json));
   const std::vector<Done> done = run_experiments(*experiments, args);
   if (!args.output.empty()) {
-    if (const auto written = write_all(files_of(done, args), args); !written) return print_failure(written.error());
+    const auto written = write_all(files_of(done, args), args);
+    if (!written) return print_failure(written.error(), object_if(args.json));
   }
   const std::vector<isp::Finding> findings = findings_of(done);
   print_out(args.json ? findings_json(findings) + '\n' : findings_text(findings));

@@ -62,6 +62,14 @@ std::string one_dark(const std::string& file) {
       file, folder.empty() ? "." : folder + "/");
 }
 
+/// Replaces folders, patterns and lists by the raw files that they name. @return the exit code of an error, printed
+std::optional<int> expand(const CalibrateArgs& args, std::vector<std::string>& files) {
+  auto named = raw_files_of_lists(files, args.quiet);
+  if (!named) return print_failure(named.error(), object_if(args.json));
+  files = *std::move(named);
+  return std::nullopt;
+}
+
 }  // namespace
 
 Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>& words) {
@@ -73,7 +81,9 @@ Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>&
       "pedestal includes the dark signal. The system gain is that of --system-gain, else of --add-to, else it is "
       "measured on the noise of the dark charge.");
   CalibrateBlackArgs args;
-  app.add_option("FRAMES", args.common.frames, "dark frames: lens covered; with --masked any frames")->required();
+  app.add_option("FRAMES", args.common.frames,
+                 "dark frames, lens covered: files, a folder or a quoted pattern; with --masked any frames")
+      ->required();
   add_output(app, args.common);
   add_settings(app, args.common);
   add_number(app, "--system-gain", "DN_PER_E", "system gain in DN per electron",
@@ -84,6 +94,7 @@ Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>&
                  "PREFIX_current.pfm [e-/s] (with the ISO in the name if there are several)")
       ->type_name("PREFIX");
   if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = expand(args.common, args.common.frames)) return *code;
   if (args.system_gain_dn_per_e && *args.system_gain_dn_per_e <= 0) return refuse(app, "--system-gain must be above 0");
   if (const std::string what = wrong(args.common, args.common.frames); !what.empty()) return refuse(app, what);
   return args;
@@ -97,7 +108,9 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
       "gain, exposure time and level, in the given order. All darks have one exposure time, best a short one. Without "
       "--darks the input is one ordinary image, and noise is measured in its even areas.");
   CalibrateNoiseArgs args;
-  app.add_option("FRAMES", args.common.frames, "flats in pairs, or one ordinary picture")->required();
+  app.add_option("FRAMES", args.common.frames,
+                 "flats in pairs: files, a folder or a quoted pattern; or one ordinary picture")
+      ->required();
   app.add_option("--darks", args.darks, "two or more dark frames: files, a folder or a quoted pattern; repeatable")
       ->type_name("FILE[,FILE...]|FOLDER")
       ->allow_extra_args(false);
@@ -111,9 +124,9 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
       [&args](Method method) { args.method = method; },
       "for one picture: blocks, or single details (default ponomarenko)");
   if (const auto code = parse_words(app, words)) return *code;
-  const auto darks = raw_files_of_lists(args.darks);
-  if (!darks) return print_failure(darks.error());
-  args.darks = *darks;
+  for (std::vector<std::string>* files : {&args.common.frames, &args.darks}) {
+    if (const auto code = expand(args.common, *files)) return *code;
+  }
   if (args.darks.empty() && args.common.frames.size() > 1) {
     return refuse(app, "several flats need --darks; without darks one picture is measured");
   }
@@ -187,9 +200,7 @@ Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>&
   app.add_flag("--quiet", args.common.quiet, "print no warnings and no progress");
   if (const auto code = parse_words(app, words)) return *code;
   for (std::vector<std::string>* files : {&args.common.frames, &args.darks}) {
-    const auto named = raw_files_of_lists(*files);
-    if (!named) return print_failure(named.error());
-    *files = *named;
+    if (const auto code = expand(args.common, *files)) return *code;
   }
   if (light.any() && !light.all_positive()) {
     return refuse(app, "--irradiance, --wavelength and --pixel-pitch belong together, and are above 0");

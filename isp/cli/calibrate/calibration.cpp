@@ -108,8 +108,7 @@ calib::Measured measured_today(std::vector<std::string> files) {
 
 int calibration_failed(const CalibrateArgs& args, const Error& error) {
   const std::string what = error.where.empty() ? "calibrate" : error.where;
-  if (args.json) print_out(fmt::format("{}\n", error_json(what, error)));
-  return print_failure(what, error);
+  return print_failure(what, error, object_if(args.json));
 }
 
 Result<void> write_calibration(const CalibrateArgs& args, const Calibration& found) {

@@ -287,7 +287,7 @@ Parsed<CaptureArgs> parse_capture(const std::vector<std::string>& words) {
   add_look(app, args.develop.look);
   add_camera(app, args.develop);
   add_denoise(app, args.develop);
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_words(app, words, &args.develop.defaults)) return *code;
   if (const auto wrong = complete(app, said, args)) return refuse(app, *wrong);
   return args;
 }

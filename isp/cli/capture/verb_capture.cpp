@@ -200,7 +200,7 @@ int run_capture(const std::vector<std::string>& words) {
     const auto format = isp::format_of(frame_file(args, 1));
     if (!format) return print_usage_error("capture", format.error());
     if (const auto fits = complete_options(args.develop, *format); !fits)
-      return print_usage_error("capture", fits.error());
+      return print_usage_error("capture", fits.error(), args.develop.defaults);
   }
   if (args.kind == CaptureKind::live && ::isatty(STDOUT_FILENO) == 1) {
     return print_usage_error("capture",

@@ -17,11 +17,7 @@ int run_compare(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<CompareArgs>(parsed);
   const Result<CompareOutcome> done = compare_files(args);
-  if (!done) {
-    const Error& error = done.error();
-    if (args.json) print_out(fmt::format("{}\n", error_json(error.where, error)));
-    return print_failure(error);
-  }
+  if (!done) return print_failure(done.error(), object_if(args.json));
   for (const std::string& warning : done->warnings) {
     print_err(fmt::format("{}\n", one_line("lowlux compare: warning: " + warning)));
   }

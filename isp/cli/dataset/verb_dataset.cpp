@@ -195,13 +195,15 @@ int run_dataset(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<DatasetArgs>(parsed);
   const Result<DatasetSpec> spec = read_dataset_spec(args.spec);
-  if (!spec) return print_failure(args.spec, spec.error());
+  if (!spec) return print_failure(args.spec, spec.error(), object_if(args.json));
   {
     InlineExecutor executor;
-    if (const auto good = check_dataset(*spec, executor); !good) return print_failure(args.spec, good.error());
+    if (const auto good = check_dataset(*spec, executor); !good) {
+      return print_failure(args.spec, good.error(), object_if(args.json));
+    }
   }
   const Result<DatasetOutcome> outcome = args.dry_run ? dry_run(*spec, args) : ShardRun(*spec, args).run();
-  if (!outcome) return print_failure(with_file(outcome.error(), args.spec));
+  if (!outcome) return print_failure(with_file(outcome.error(), args.spec), object_if(args.json));
   print_outcome(*spec, args, *outcome);
   return exit_done;
 }

@@ -36,7 +36,7 @@ Result<void> add_flat(const std::string& file, calib::DarkStack& stack, calib::F
 Result<CalibrationFiles> calibration_files(const DevelopArgs& args, const std::vector<Job>& jobs) {
   Result<DarkNames> darks = dark_files(args, jobs);
   if (!darks) return tl::make_unexpected(darks.error());
-  Result<std::vector<std::string>> flats = raw_files_of_lists(args.flats);
+  Result<std::vector<std::string>> flats = raw_files_of_lists(args.flats, args.quiet);
   if (!flats) return tl::make_unexpected(flats.error());
   if (auto apart = check_no_picture(jobs, *flats, "--flat-frame", "flats"); !apart) {
     return tl::make_unexpected(apart.error());

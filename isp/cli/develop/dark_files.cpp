@@ -133,9 +133,9 @@ std::vector<std::string> DarkNames::all() const {
 }
 
 Result<DarkNames> dark_files(const DevelopArgs& args, const std::vector<Job>& jobs) {
-  auto darks = raw_files_of_lists(args.dark.words);
+  auto darks = raw_files_of_lists(args.dark.words, args.quiet);
   if (!darks) return tl::make_unexpected(darks.error());
-  auto bias = raw_files_of_lists(args.dark.bias);
+  auto bias = raw_files_of_lists(args.dark.bias, args.quiet);
   if (!bias) return tl::make_unexpected(bias.error());
   const bool level_given = args.options.black.choice != isp::BlackChoice::automatic;
   if ((!darks->empty() && (level_given || !args.black_profile.empty())) || (!bias->empty() && level_given)) {

@@ -165,7 +165,7 @@ Parsed<DevelopArgs> parse_merge(const std::vector<std::string>& words) {
 Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
   CLI::App app("Prints the metadata of raw files and measurements on them.", "lowlux info");
   InfoArgs args;
-  app.add_option("RAW", args.inputs, "raw files; with --advise one or none");
+  app.add_option("RAW", args.inputs, "raw files, or folders of them; with --advise one raw file or none");
   app.add_flag("--json", args.json, "print JSON instead of text");
   add_advise(app, args.advise);
   if (const auto code = parse_words(app, words)) return *code;
@@ -384,7 +384,7 @@ void add_flats(CLI::App& app, std::vector<std::string>& flats) {
 }
 
 void add_samples(CLI::App& app, DevelopArgs& args) {
-  app.add_option("--bits", args.bits, bits_help)->check(CLI::IsMember({8, 16, 32}));
+  add_bits(app, args.bits);
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
 }
 

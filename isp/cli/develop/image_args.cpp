@@ -121,7 +121,7 @@ void add_white_balance(CLI::App& app, Choice& choice) {
       app, "--wb", "as-shot|auto|PRESET|KELVIN|R,G,B|PIXEL",
       "white balance: of the camera, estimated, a preset (daylight, cloudy, shade, tungsten, fluorescent, flash), a "
       "colour temperature and tint (5000,10), gains, or neutral at a pixel, pick:X,Y[,SIZE] (default: as-shot)",
-      [&choice](const std::string& text) { return set_white_balance(text, choice); });
+      [&choice](const std::string& text) { return set_white_balance(text, choice); }, Comma::separator);
 }
 
 void add_adjustments(CLI::App& app, isp::DevelopOptions& options) {

@@ -34,13 +34,13 @@ int run_develop(const std::vector<std::string>& words) {
   std::optional<std::vector<std::string>> frames;
   if (args.merge) {
     Result<std::vector<std::string>> files = files_to_merge(args);
-    if (!files) return print_argument_error("develop", files.error(), args.defaults);
+    if (!files) return print_argument_error("develop", files.error(), args.defaults, array_if(args.json));
     frames = *std::move(files);
     args.inputs = {frames->front()};
     args.merging.options.developed_after = true;
   }
   Result<std::vector<Job>> jobs = plan_outputs(args, "png");
-  if (!jobs) return print_argument_error("develop", jobs.error(), args.defaults);
+  if (!jobs) return print_argument_error("develop", jobs.error(), args.defaults, array_if(args.json));
   const Result<isp::FileFormat> format = format_of_output(args, jobs->front().output);
   if (!format) return print_usage_error("develop", format.error(), args.defaults);
   const bool is_named = !names_folder(args) && !is_standard_stream(args.output);
@@ -53,9 +53,9 @@ int run_develop(const std::vector<std::string>& words) {
   if (!options) return print_usage_error("develop", options.error(), args.defaults);
 
   const Result<CalibrationFiles> calibration = calibration_files(args, frames ? jobs_of(*frames, *jobs) : *jobs);
-  if (!calibration) return print_argument_error("develop", calibration.error(), args.defaults);
+  if (!calibration) return print_argument_error("develop", calibration.error(), args.defaults, array_if(args.json));
   Result<RawBatch> batch = make_batch(args, *std::move(options), *std::move(jobs), *calibration);
-  if (!batch) return print_failure(batch.error());
+  if (!batch) return print_failure(batch.error(), array_if(args.json));
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {
     return develop_frame(*batch, job, frames, executor, progress, out).and_then([&](const DevelopedFrame& developed) {
       return write_developed(*batch, job, developed, executor, out);

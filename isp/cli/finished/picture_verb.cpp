@@ -19,8 +19,7 @@ namespace {
 int failed(const PictureVerb& verb, Error error) {
   const std::string& input = verb.inputs.front();
   error = with_file(std::move(error), input);
-  if (verb.json) print_out(fmt::format("{}\n", error_json(input, error)));
-  return print_failure(input, error);
+  return print_failure(input, error, object_if(verb.json));
 }
 
 }  // namespace
@@ -40,7 +39,7 @@ int run_picture_verb(const PictureVerb& verb, const PictureWork& work) {
   const Result<isp::FileFormat> format = isp::format_of(verb.output);
   if (!format) return print_usage_error(verb.name, format.error());
   const Result<PictureKind> kind = picture_kind(*format, verb.bits, std::nullopt);
-  if (!kind) return print_usage_error(verb.name, kind.error());
+  if (!kind) return print_usage_error(verb.name, kind.error(), verb.defaults);
   if (const std::string wrong = wrong_names({verb.output}, verb.inputs); !wrong.empty()) {
     return print_usage_error(verb.name, {ErrorCode::invalid_argument, wrong, "-o"});
   }

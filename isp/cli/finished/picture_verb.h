@@ -8,6 +8,7 @@
 #include "isp/base/executor.h"
 #include "isp/base/image.h"
 #include "isp/base/result.h"
+#include "isp/cli/config/config_file.h"
 #include "isp/cli/shared/outputs.h"
 
 namespace lowlux::cli {
@@ -22,6 +23,7 @@ struct PictureVerb {
   bool force = false;
   bool json = false;
   bool quiet = false;
+  Defaults defaults = {};  // of the user's file
 };
 
 /// Reads, processes, writes by write_made() and prints its report; returns warnings.

@@ -63,12 +63,12 @@ Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words) {
            });
   app.add_option("--radius", args.radius, "radius in pixels over which the brightness is averaged (default 4)")
       ->check(CLI::Range(0, 64));
-  app.add_option("--bits", args.bits, bits_help)->check(CLI::IsMember({8, 16, 32}));
+  add_bits(app, args.bits);
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
   app.add_flag("--force", args.force, "overwrite a file that exists");
   app.add_flag("--json", args.json, "print JSON instead of text");
   app.add_flag("--quiet", args.quiet, "print no warnings and no text");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_words(app, words, &args.defaults)) return *code;
   if (args.black_codes.has_value() == args.black_area.has_value()) {
     return refuse(app, "give the black point once: --black R,G,B, or --black-area of an area without light");
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isp/base/frame.h"
+#include "isp/cli/config/config_file.h"
 #include "isp/cli/develop/develop_args.h"
 
 namespace lowlux::cli {
@@ -24,6 +25,7 @@ struct ResaturateArgs {
   bool force = false;
   bool json = false;
   bool quiet = false;
+  Defaults defaults;  // of the user's file
 };
 
 Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words);

@@ -45,12 +45,12 @@ Parsed<RetargetArgs> parse_retarget(const std::vector<std::string>& words) {
   add_luminance(app, "--display-black", "luminance of the display's black (default 0)",
                 args.options.display_black_cd_m2);
   add_model(app, args);
-  app.add_option("--bits", args.bits, bits_help)->check(CLI::IsMember({8, 16, 32}));
+  add_bits(app, args.bits);
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
   app.add_flag("--force", args.force, "overwrite a file that exists");
   app.add_flag("--json", args.json, "print JSON instead of text");
   app.add_flag("--quiet", args.quiet, "print no warnings and no text");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_words(app, words, &args.defaults)) return *code;
   if (const auto possible = isp::retargeting(args.options); !possible) return refuse(app, possible.error().message);
   if (isp::coefficients_name(args.options).empty() && (!args.coefficients.empty() || app.count("--units") > 0)) {
     return refuse(app, "--coefficients and --units: the model " + std::string(isp::name_of(args.options.method)) +

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "isp/cli/config/config_file.h"
 #include "isp/cli/develop/develop_args.h"
 #include "isp/render/retarget/retarget.h"
 
@@ -20,6 +21,7 @@ struct RetargetArgs {
   bool force = false;
   bool json = false;
   bool quiet = false;
+  Defaults defaults;  // of the user's file
 };
 
 Parsed<RetargetArgs> parse_retarget(const std::vector<std::string>& words);

@@ -61,7 +61,8 @@ void add_warnings(ResaturateOutcome& out) {
 }
 
 PictureVerb verb_of(const ResaturateArgs& args) {
-  return {"resaturate", {args.input}, args.output, args.bits, args.jpeg_quality, args.force, args.json, args.quiet};
+  return {"resaturate", {args.input}, args.output, args.bits,    args.jpeg_quality,
+          args.force,   args.json,    args.quiet,  args.defaults};
 }
 
 Result<ResaturateOutcome> worked(const ResaturateArgs& args, const PictureKind& kind, Executor& executor) {

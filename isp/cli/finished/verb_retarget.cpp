@@ -26,8 +26,8 @@ struct RetargetOutcome {
 };
 
 PictureVerb verb_of(const RetargetArgs& args) {
-  PictureVerb verb{"retarget",        {args.input}, args.output, args.bits,
-                   args.jpeg_quality, args.force,   args.json,   args.quiet};
+  PictureVerb verb{"retarget", {args.input}, args.output, args.bits,    args.jpeg_quality,
+                   args.force, args.json,    args.quiet,  args.defaults};
   if (!args.coefficients.empty()) verb.inputs.push_back(args.coefficients);
   return verb;
 }

@@ -15,6 +15,7 @@
 #include "isp/cli/shared/raw_files.h"
 #include "isp/cli/shared/standard_streams.h"
 #include "isp/output/dng/dng_writer.h"
+#include "isp/pipeline/plan/plan_develop.h"
 
 namespace lowlux::cli {
 namespace {
@@ -41,7 +42,7 @@ Result<std::vector<std::string>> files_to_merge(const DevelopArgs& args) {
     if (is_standard_stream(input)) {
       return fail(ErrorCode::invalid_argument, "frames to merge are read more than once: name their files", "-");
     }
-    Result<std::vector<std::string>> named = raw_files_of(input);
+    Result<std::vector<std::string>> named = raw_files_of(input, args.quiet);
     if (!named) return named;
     std::ranges::move(*named, std::back_inserter(files));
   }
@@ -88,12 +89,15 @@ Result<MergeReport> merge_files(const RawBatch& batch, const std::vector<std::st
       const auto found = find_noise(read->options, batch.args.noise, read->frame, alone);
       if (!found) return tl::make_unexpected(with_file(found.error(), file));
       if (is_reference) origin = *found;
+    } else {
+      isp::refer_noise_to_black(read->frame, read->options);
     }
     return isp::FrameToMerge{std::move(read->frame), std::move(read->options), file};
   };
   auto merged = isp::merge_frames(static_cast<int>(inputs.size()), read_input, options, executor,
                                   [&](double fraction) { progress.reach(0.9 * fraction); });
   if (!merged) return tl::make_unexpected(merged.error());
+  if (auto warning = little_used_warning(inputs, *merged)) merged->warnings.push_back(*std::move(warning));
   return MergeReport{inputs, *std::move(merged), std::move(origin)};
 }
 

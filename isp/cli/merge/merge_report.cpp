@@ -22,10 +22,15 @@ std::string_view alignment_name(isp::MergeAlignment alignment) {
   return {};
 }
 
+constexpr double little_used = 0.1;  // fraction of the image; frames used less are reported
+
 std::string reason_of(const isp::FrameUse& use, bool by_stars) {
   if (!use.aligned) return by_stars ? "its stars do not match" : "its displacement could not be found";
   if (use.used_fraction > 0.99) return "it matches the reference";
-  if (use.mean_chi_square > 2) return "it differs from the reference by more than noise";
+  const bool is_compared = use.mean_chi_square > 0 || use.outliers > 0;
+  if (use.used_fraction == 0 && !is_compared) return "no part of it can be compared, as where one frame is saturated";
+  if (use.mean_chi_square > 2 || use.used_fraction < little_used)
+    return "it differs from the reference by more than noise";
   return "parts of its content moved";
 }
 
@@ -57,6 +62,23 @@ nlohmann::ordered_json budget_json(const isp::MergePlan& plan) {
 }
 
 }  // namespace
+
+std::optional<std::string> little_used_warning(const std::vector<std::string>& inputs, const isp::MergedRaw& merged) {
+  std::string first;
+  int count = 0;
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const isp::FrameUse& use = merged.frames[i];
+    // Frames at rest are compared with what most of them show, the first one too.
+    const bool is_reference = merged.alignment != isp::MergeAlignment::none && static_cast<int>(i) == merged.reference;
+    if (is_reference || !use.aligned || use.used_fraction >= little_used) continue;
+    if (++count == 1) first = fmt::format("{}: {}", inputs[i], reason_of(use, false));
+  }
+  if (count == 0) return std::nullopt;
+  return fmt::format(
+      "{} of {} frames match{} the reference in less than {:.0f} % of the image ({}); leave such frames "
+      "out, --explain lists each",
+      count, inputs.size(), count == 1 ? "es" : "", 100 * little_used, first);
+}
 
 std::string merge_text(const MergeReport& report) {
   const auto& [inputs, merged, origin] = report;

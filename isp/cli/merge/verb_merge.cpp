@@ -76,11 +76,11 @@ int run_merge(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<DevelopArgs>(parsed);
   const Result<Files> files = files_of(args);
-  if (!files) return print_argument_error("merge", files.error(), args.defaults);
+  if (!files) return print_argument_error("merge", files.error(), args.defaults, object_if(args.json));
   Result<RawBatch> batch = make_batch(args, args.options, {files->output}, files->calibration);
-  if (!batch) return print_failure(batch.error());
+  if (!batch) return print_failure(batch.error(), object_if(args.json));
   const Result<MergeReport> report = merge_and_write(args, *files, *batch);
-  if (!report) return print_failure(report.error());
+  if (!report) return print_failure(report.error(), object_if(args.json));
   print_report(args, *report);
   return exit_done;
 }

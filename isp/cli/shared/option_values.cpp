@@ -146,17 +146,24 @@ std::optional<std::vector<double>> numbers_of(const std::string& text, std::size
 }
 
 CLI::Option* add_text(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
-                      OptionStore store) {
+                      OptionStore store, Comma comma) {
   return app
       .add_option_function<std::string>(
           flag,
-          [store = std::move(store), flag](const std::string& text) {
+          [store = std::move(store), flag, comma](const std::string& text) {
             const auto wrong = store(text);
             if (!wrong) return;
-            throw CLI::ValidationError(flag, fmt::format("'{}' {}{}", text, *wrong, decimal_point_hint(text, store)));
+            const std::string hint = comma == Comma::decimal ? decimal_point_hint(text, store) : std::string();
+            throw CLI::ValidationError(flag, fmt::format("'{}' {}{}", text, *wrong, hint));
           },
           help)
       ->type_name(type);
+}
+
+CLI::Option* add_bits(CLI::App& app, std::optional<int>& bits) {
+  return add_choice<int>(
+      app, "--bits", {{"8", 8}, {"16", 16}, {"32", 32}}, [&bits](int chosen) { bits = chosen; },
+      "bits per sample (default: PNG, JPEG 8, TIFF, EXR 16, PFM 32)");
 }
 
 CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
@@ -199,10 +206,27 @@ void parse_all(CLI::App& app, const std::vector<std::string>& words, const Defau
   app.parse(last_first);
 }
 
+/// Returns what is wrong with the arguments. CLI11 reports repeated options and unreadable numbers in technical terms,
+/// which are replaced.
 std::string error_text(const CLI::ParseError& error) {
   std::string text = error.what();
   std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
+  const std::size_t repeated = text.find(": At Most 1 required but received ");
+  if (repeated != std::string::npos) return text.substr(0, repeated) + " is given more than once";
+  constexpr std::string_view unreadable = "Could not convert: ";
+  const std::size_t equals = text.find(" = ");
+  if (!text.starts_with(unreadable) || equals == std::string::npos) return text;
+  return fmt::format("{}: '{}' is not a whole number", text.substr(unreadable.size(), equals - unreadable.size()),
+                     text.substr(equals + 3));
+}
+
+/// Returns the first option whose value is empty, which CLI11 takes for an option that is not given; nullptr: none.
+const CLI::Option* empty_option(const CLI::App& app) {
+  const auto options = app.get_options([](const CLI::Option* option) {
+    return option->nonpositional() && option->get_expected_max() != 0 &&
+           std::ranges::find(option->results(), std::string()) != option->results().end();
+  });
+  return options.empty() ? nullptr : options.front();
 }
 
 }  // namespace
@@ -235,6 +259,7 @@ std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& wo
     if (const auto unknown = unknown_option(app)) return refuse(app, *unknown);
     return refuse(app, error_text(error));
   }
+  if (const CLI::Option* const empty = empty_option(app)) return refuse(app, empty->get_name() + " has no value");
   if (used != nullptr) *used = *defaults;
   return std::nullopt;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <functional>
 #include <initializer_list>
 #include <optional>
@@ -63,9 +64,12 @@ std::string joined(const Names<Enum>& names, std::string_view separator = ", ") 
 /// Stores the text of an option. @return the error, or nothing
 using OptionStore = std::function<std::optional<std::string>(const std::string&)>;
 
+/// States what a comma in a value that is refused can be.
+enum class Comma : std::uint8_t { decimal, separator };
+
 /// Adds an option that takes text. If a decimal comma is the error, the message shows the number with a point.
 CLI::Option* add_text(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
-                      OptionStore store);
+                      OptionStore store, Comma comma = Comma::decimal);
 
 /// Adds an option that takes a quantity; `type` names its unit: S, C, CD_M2, DN, E, UM, PX, PX_PER_S or f/N.
 CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
@@ -92,8 +96,8 @@ CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum
 /// Adds --shard I/N. @param help  which pieces of work are counted
 CLI::Option* add_shard(CLI::App& app, const std::string& help, Shard& shard);
 
-/// Help text of --bits, for all verbs that write images.
-inline constexpr const char* bits_help = "bits per sample: 8, 16 or 32 (default: PNG, JPEG 8, TIFF, EXR 16, PFM 32)";
+/// Adds --bits of the verbs that write images.
+CLI::Option* add_bits(CLI::App& app, std::optional<int>& bits);
 
 /// Prints the error of the arguments. @return the exit code
 int refuse(const CLI::App& app, const std::string& wrong);

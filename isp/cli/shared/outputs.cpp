@@ -45,7 +45,7 @@ SampleType sample_type_of(FileFormat format, int bits) {
 Result<std::vector<std::string>> inputs_of(const DevelopArgs& args) {
   std::vector<std::string> out;
   for (const std::string& input : args.inputs) {
-    auto files = raw_files_of(input);
+    auto files = raw_files_of(input, args.quiet);
     if (!files) return files;
     out.insert(out.end(), files->begin(), files->end());
   }
@@ -128,8 +128,10 @@ Result<PictureKind> picture_kind(FileFormat format, std::optional<int> bits, std
   if (format == FileFormat::exr && depth == 8)
     return fail(ErrorCode::invalid_argument, "OpenEXR holds 16 or 32 bits", "--bits");
   kind.samples = sample_type_of(format, depth);
-  if (const auto fits = isp::check_writable(format, kind.samples, kind.space); !fits)
-    return tl::make_unexpected(fits.error());
+  if (const auto fits = isp::check_writable(format, kind.samples, kind.space); !fits) {
+    const bool space_is_wrong = isp::supported(format, kind.samples) && space;
+    return fail(fits.error().code, fits.error().message, space_is_wrong ? "--space" : "--bits");
+  }
   return kind;
 }
 

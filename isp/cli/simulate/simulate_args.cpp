@@ -134,9 +134,11 @@ void add_scene(CLI::App& app, SceneArgs& s) {
   add_number(app, "--star-luminance", "CD_M2",
              "of the faintest star's light, spread over one pixel (default: a tenth of --luminance)",
              [&s](double value) { s.star_luminance_cd_m2 = value; });
-  add_text(app, "--lamp", "X,Y,LIGHT,CD_M2", "add a distant lamp at a pixel, its light spread over one pixel",
+  add_text(app, "--lamp", "X,Y,LIGHT,CD_M2",
+           "add a distant lamp at a pixel, its light spread over one pixel; repeatable",
            [&s](const std::string& text) { return add_lamp(text, s); })
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->trigger_on_parse();
 }
 
 void add_figures(CLI::App& app, SimulateArgs& args) {
@@ -160,12 +162,19 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
              return std::nullopt;
            })
       ->group("Sensor figures");
+  const auto not_negative = [&app](const std::string& flag, const std::string& type, const std::string& help,
+                                   std::optional<double>& out) {
+    add_text(app, flag, type, help, [&out](const std::string& text) -> Wrong {
+      out = number_of(text);
+      return out && *out >= 0 ? Wrong() : "is not a number of at least 0";
+    })->group("Sensor figures");
+  };
   figure("--dark-temperature", "C", "temperature at which the dark current is stated", f.dark_temperature_c);
   figure("--dark-doubling", "C", "degrees over which the dark current doubles", f.dark_doubling_c);
-  figure("--dark-activation", "EV", "activation energy: an Arrhenius law in place of the doubling",
-         f.dark_activation_ev);
-  figure("--dark-floor", "E_PER_S", "part of the dark current that does not depend on temperature",
-         f.dark_floor_e_per_s);
+  not_negative("--dark-activation", "EV", "activation energy: an Arrhenius law in place of the doubling",
+               f.dark_activation_ev);
+  not_negative("--dark-floor", "E_PER_S", "part of the dark current that does not depend on temperature",
+               f.dark_floor_e_per_s);
   figure("--prnu", "RATIO", "photo response non-uniformity", f.prnu);
   figure("--dsnu", "RATIO", "dark signal non-uniformity, of the dark current", f.dsnu);
   figure("--hot-pixels", "RATIO", "fraction of pixels that are hot", f.hot_pixel_fraction);

@@ -207,6 +207,18 @@ std::string simulate_list() {
   return text;
 }
 
+std::string simulate_list_json() {
+  Json sensors = Json::array();
+  for (const std::string_view name : isp::sensor_names()) {
+    Json settings = Json::array();
+    for (const std::string_view gain : isp::gain_settings(name)) {
+      settings.push_back({{"gain_setting", gain}, {"options_needed", isp::options_needed(name, gain)}});
+    }
+    sensors.push_back({{"name", name}, {"gain_settings", settings}});
+  }
+  return Json{{"sensors", sensors}, {"lights", isp::light_names()}, {"cameras", isp::camera_names()}}.dump(2);
+}
+
 std::string burst_truth_json(const SimulateArgs& args, const capture::BurstSource& source,
                              const std::vector<std::string>& files) {
   const capture::ImageSize size = source.size();

@@ -32,8 +32,10 @@ std::string explain_text(const SimulateArgs& args, const SimulateOutcome& outcom
 std::string simulate_text(const SimulateArgs& args, const SimulateOutcome& outcome);
 /// Returns all results as one JSON object.
 std::string simulate_json(const SimulateArgs& args, const SimulateOutcome& outcome);
-/// Returns the sensors with their gain settings and the options each needs, lights and cameras.
+/// Returns the sensors with their gain settings and the options each needs, lights and cameras: as
+/// text, and as one JSON object.
 std::string simulate_list();
+std::string simulate_list_json();
 
 /// Returns the truth of a burst as JSON: size, options and, for each frame, its file, exposure time, motions and boxes
 /// of moving objects; then the points of frame 0. Positions are in pixels, integers at their centres; motions are those

@@ -38,7 +38,7 @@ int run_simulate(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<SimulateArgs>(parsed);
   if (args.list) {
-    print_out(fmt::format("{}", simulate_list()));
+    print_out(args.json ? simulate_list_json() + "\n" : simulate_list());
     return exit_done;
   }
   if (const std::string wrong = wrong_files(args); !wrong.empty()) {
@@ -47,7 +47,7 @@ int run_simulate(const std::vector<std::string>& words) {
   const Result<SimulateOutcome> outcome = simulate(args);
   if (!outcome) {
     const Error& error = outcome.error();
-    if (error.code != ErrorCode::invalid_argument) return print_failure(args.scene.what, error);
+    if (error.code != ErrorCode::invalid_argument) return print_failure(args.scene.what, error, object_if(args.json));
     const std::string place = error.where.empty() ? "" : " (" + error.where + ")";
     return print_usage_error("simulate", {error.code, error.message + place, {}});
   }
