@@ -89,11 +89,15 @@ Result<void> LivePipeline::warm_up() {
   }
   planner_.use_all_effects(true);  // each frame decides anew which effects it needs
   const bool bayer = setup_.format.layout == SensorLayout::bayer;
-  for (const bool reduces : {false, true}) {
-    if (reduces && !bayer) continue;
-    facts.denoise = {.mode = reduces && setup_.levels ? LiveDenoise::Mode::level : LiveDenoise::Mode::off,
+  // The result of previous frames alone lies in memory that the result of a level does not need.
+  enum class Reduction { none, temporal, temporal_and_level };
+  for (const Reduction reduction : {Reduction::none, Reduction::temporal, Reduction::temporal_and_level}) {
+    if (reduction != Reduction::none && !bayer) continue;
+    const bool has_level = reduction == Reduction::temporal_and_level;
+    if (has_level && !setup_.levels) continue;
+    facts.denoise = {.mode = has_level ? LiveDenoise::Mode::level : LiveDenoise::Mode::off,
                      .level = setup_.most,
-                     .temporal = reduces};
+                     .temporal = reduction != Reduction::none};
     if (Result<void> planned = plan(facts); !planned) return planned;
     if (setup_.samples == SampleType::u16) {
       Plane<std::uint16_t> rgb(3 * setup_.active.width, setup_.active.height);
