@@ -133,7 +133,7 @@ TEST(DevelopWithDarkFrame, TheNoiseOfAFileIsThatAboveItsTaggedBlack) {
       EXPECT_NEAR(1 / noise.scale[colour], electrons, 1e-9 * electrons) << dark_dn;
       EXPECT_NEAR(noise.offset[colour] * electrons * electrons, std::pow(read_dn / gain_dn_per_e, 2), 1e-9) << dark_dn;
     }
-    frame.noise->source = NoiseProfile::Source::profile;  // is stated above the black that is subtracted
+    frame.noise->source = NoiseProfile::Source::profile;  // that of a profile is left as it is
     const NoiseProfile before = *frame.noise;
     refer_noise_to_black(frame, options);
     EXPECT_EQ(frame.noise->scale, before.scale);

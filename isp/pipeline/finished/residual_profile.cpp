@@ -29,11 +29,12 @@ struct Line {
   double offset = 0;
 };
 
-/// Returns the line of least squares with weights by the line `at`.
-Line weighted_fit(const std::vector<Sample>& samples, const Line& at) {
+/// Returns the line of least squares with weights by the line `at`; without it, by the variances themselves.
+Line weighted_fit(const std::vector<Sample>& samples, const Line* at) {
   double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0;
   for (const Sample& s : samples) {
-    const double line = at.scale * s.x + at.offset, weight = 1 / (line * line);
+    const double expected = at != nullptr ? at->scale * s.x + at->offset : s.variance;
+    const double weight = 1 / (expected * expected);
     w += weight;
     wx += weight * s.x;
     wy += weight * s.variance;
@@ -49,13 +50,14 @@ Line weighted_fit(const std::vector<Sample>& samples, const Line& at) {
   return {std::max(wxy / wxx, min_scale), 0};
 }
 
-Line fitted(const std::vector<Sample>& samples) {
+Line fitted(const std::vector<Sample>& samples, ProfileFit fit) {
+  if (fit == ProfileFit::least) return weighted_fit(samples, nullptr);
   double sum = 0;
   for (const Sample& s : samples) sum += s.variance;
   if (!(sum > 0)) return {};
   Line out{.scale = 0, .offset = sum / static_cast<double>(samples.size())};
   for (int i = 0; i < fit_rounds; ++i) {
-    Line next = weighted_fit(samples, out);
+    Line next = weighted_fit(samples, &out);
     // An offset of 0 would give samples without light all the weight.
     next.offset = std::max(next.offset, min_offset_fraction * out.offset);
     out = next;
@@ -63,10 +65,10 @@ Line fitted(const std::vector<Sample>& samples) {
   return out;
 }
 
-NoiseProfile profile_of(const std::array<std::vector<Sample>, 3>& samples) {
+NoiseProfile profile_of(const std::array<std::vector<Sample>, 3>& samples, ProfileFit fit) {
   NoiseProfile out{.reduced = true};
   for (std::size_t c = 0; c < 3; ++c) {
-    const Line line = fitted(samples[c]);
+    const Line line = fitted(samples[c], fit);
     out.scale[c] = line.scale;
     out.offset[c] = line.offset;
   }
@@ -79,7 +81,7 @@ std::int64_t sample_step(std::int64_t cells) { return std::max<std::int64_t>(1, 
 }  // namespace
 
 NoiseProfile residual_profile(const SignalElectronsView& signal_e, const std::array<Plane<float>, 3>& site_variance_e2,
-                              const PerSite<double>& light_e, double added) {
+                              const PerSite<double>& light_e, double added, ProfileFit fit) {
   std::array<std::vector<Sample>, 3> samples;
   const int columns = signal_e.value.width / 2, rows = signal_e.value.height / 2;
   const std::int64_t cells = static_cast<std::int64_t>(columns) * rows;
@@ -94,7 +96,7 @@ NoiseProfile residual_profile(const SignalElectronsView& signal_e, const std::ar
       if (variance > 0) samples[colour].push_back({std::max(0.0, signal_e.value.at(x, y) * unit), variance});
     }
   }
-  return profile_of(samples);
+  return profile_of(samples, fit);
 }
 
 NoiseProfile residual_profile(std::span<const Plane<float>> planes, const NoiseMaps& maps,
@@ -111,7 +113,7 @@ NoiseProfile residual_profile(std::span<const Plane<float>> planes, const NoiseM
     }
   }
   if (planes.size() == 1) samples[1] = samples[2] = samples[0];
-  return profile_of(samples);
+  return profile_of(samples, ProfileFit::mean);
 }
 
 }  // namespace lowlux::isp

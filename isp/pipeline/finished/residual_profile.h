@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 
 #include "isp/base/frame.h"
@@ -10,15 +11,21 @@
 
 namespace lowlux::isp {
 
-/// Returns the straight line variance = scale x + offset that is nearest, relative to the variances, to the residual
-/// noise at each site; x and variances in fractions of white. Scales are at least what electrons_at_white accepts,
-/// offsets at least 0.
+/// Lists what a line is fitted to.
+enum class ProfileFit : std::uint8_t {
+  mean,   // the mean of variances that scatter: the largest likelihood of gamma variances
+  least,  // the smallest variances, by least squares relative to each: the dark sites of a bracket
+};
+
+/// Returns the straight line variance = scale x + offset that is nearest, as `fit` states, to the residual noise at
+/// each site; x and variances in fractions of white. Scales are at least what electrons_at_white accepts, offsets at
+/// least 0.
 /// @param signal_e         the clean mosaic
 /// @param site_variance_e2 of R, G, B in each 2x2 cell
 /// @param light_e          signal of a white pixel
 /// @param added            variance of the codes' rounding, in fractions of white squared
 NoiseProfile residual_profile(const SignalElectronsView& signal_e, const std::array<Plane<float>, 3>& site_variance_e2,
-                              const PerSite<double>& light_e, double added);
+                              const PerSite<double>& light_e, double added, ProfileFit fit = ProfileFit::mean);
 
 /// Returns the same line for frames that are no mosaics.
 /// @param planes  the clean pixels in fractions of white: R, G and B, or the one of a monochrome frame, whose line all

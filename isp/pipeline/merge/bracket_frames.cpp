@@ -9,6 +9,11 @@
 #include "isp/merge/placement.h"
 
 namespace lowlux::isp {
+namespace {
+
+constexpr double equal_light = 0.05;  // relative difference of frames of one exposure, as measured
+
+}  // namespace
 
 BracketFrames::BracketFrames(int width, int height, Executor& executor)
     : width_(width), height_(height), executor_(executor) {}
@@ -20,9 +25,12 @@ Plane<float> BracketFrames::remove_saturated(FrameElectrons& frame) const {
 }
 
 void BracketFrames::begin(FrameElectrons& reference) {
-  saturated_ = remove_saturated(reference);
+  reference_saturated_ = remove_saturated(reference);
+  saturated_ = reference_saturated_.clone();
   least_e_ = reference.signal_e.clone();
+  least_matches_ = {};
   least_light_ = 1;
+  is_aligned_ = true;
   variance_e2_ = reference.variance_e2;
 }
 
@@ -43,47 +51,57 @@ double BracketFrames::measured_light(const merge::FrameView& reference, const Fr
   return found && std::fabs(found->ratio - stated) > 3 * found->standard_error ? found->ratio : stated;
 }
 
-void BracketFrames::add(const FrameElectrons& frame, double light, const Plane<float>& saturated,
+bool BracketFrames::add(const FrameElectrons& frame, double light, const Plane<float>& saturated,
                         const merge::Motion& motion) {
-  if (light >= least_light_) return;
+  const bool has_less = light < (1 - equal_light) * least_light_;
+  const bool is_placed_better = motion.found && !is_aligned_ && light < (1 + equal_light) * least_light_;
+  if (!has_less && !is_placed_better) return false;
   least_light_ = light;
+  is_aligned_ = motion.found;
   variance_e2_ = frame.variance_e2;
-  Plane<float> placed(width_, height_);
-  merge::place_nearest(saturated.view(), frame.phase, motion, {}, placed.view(), executor_);
-  for_each_index(executor_, height_, [&](int y) {
-    for (int x = 0; x < width_; ++x) {
-      if (!std::isnan(placed.at(x, y))) saturated_.at(x, y) = placed.at(x, y);
-    }
-  });
+  merge::place_nearest(saturated.view(), frame.phase, motion, {}, saturated_.view(), executor_);
   merge::place_nearest(frame.signal_e.view(), frame.phase, motion, {}, least_e_.view(), executor_);
+  return true;
 }
 
-bool BracketFrames::lacks_values(const merge::MosaicMean& mean, int left, int top) const {
-  for (int y = top; y < std::min(top + merge::block_px, height_); ++y) {
-    for (int x = left; x < std::min(left + merge::block_px, width_); ++x) {
-      if (!(mean.weight().at(x, y) > 0) && !std::isnan(least_e_.at(x, y))) return true;
+bool BracketFrames::lacks_values(const merge::MosaicMean& mean, const Rect& block) const {
+  for (int y = block.y; y < block.y + block.height; ++y) {
+    for (int x = block.x; x < block.x + block.width; ++x) {
+      if (reference_saturated_.at(x, y) == 1 && is_missing(mean, x, y)) return true;
     }
   }
   return false;
 }
 
-void BracketFrames::fill_unmatched(merge::MosaicMean& mean) const {
+bool BracketFrames::is_missing(const merge::MosaicMean& mean, int x, int y) const {
+  return !(mean.weight().at(x, y) > 0) && !std::isnan(least_e_.at(x, y));
+}
+
+void BracketFrames::fill_block(merge::MosaicMean& mean, const Rect& block) {
+  const bool matches =
+      least_matches_.empty() || least_matches_.at(block.x / merge::block_px, block.y / merge::block_px) != 0;
+  const bool replaces = !matches && lacks_values(mean, block);
   const auto light = static_cast<float>(least_light_);
+  for (int y = block.y; y < block.y + block.height; ++y) {
+    for (int x = block.x; x < block.x + block.width; ++x) {
+      const bool is_outside = std::isnan(saturated_.at(x, y));
+      const float e = least_e_.at(x, y);
+      if (!std::isnan(e) && (replaces || (matches && is_missing(mean, x, y)))) {
+        const float variance_e2 = std::max(e, 0.0F) + static_cast<float>(variance_e2_[site_of(x, y)]);
+        mean.replace(x, y, e / light, light * light / std::max(variance_e2, 1e-6F));
+      } else if (replaces && !is_outside) {
+        mean.replace(x, y, 0, 0);
+      }
+      if (is_outside) saturated_.at(x, y) = reference_saturated_.at(x, y);
+    }
+  }
+}
+
+void BracketFrames::fill_unmatched(merge::MosaicMean& mean) {
   for_each_index(executor_, (height_ + merge::block_px - 1) / merge::block_px, [&](int row) {
     const int top = row * merge::block_px;
     for (int left = 0; left < width_; left += merge::block_px) {
-      if (!lacks_values(mean, left, top)) continue;
-      for (int y = top; y < std::min(top + merge::block_px, height_); ++y) {
-        for (int x = left; x < std::min(left + merge::block_px, width_); ++x) {
-          const float e = least_e_.at(x, y);
-          if (std::isnan(e)) {
-            if (saturated_.at(x, y) == 1) mean.replace(x, y, 0, 0);
-            continue;
-          }
-          const float variance_e2 = std::max(e, 0.0F) + static_cast<float>(variance_e2_[site_of(x, y)]);
-          mean.replace(x, y, e / light, light * light / std::max(variance_e2, 1e-6F));
-        }
-      }
+      fill_block(mean, {left, top, std::min(merge::block_px, width_ - left), std::min(merge::block_px, height_ - top)});
     }
   });
 }

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstdint>
+#include <utility>
+
 #include "isp/base/executor.h"
 #include "isp/base/plane.h"
 #include "isp/merge/frame.h"
@@ -27,26 +30,36 @@ class BracketFrames {
   double measured_light(const merge::FrameView& reference, const FrameElectrons& frame, const merge::Motion& motion,
                         double stated) const;
 
-  /// Keeps the values of a frame, and which are saturated, if it has less light than all before.
-  void add(const FrameElectrons& frame, double light, const Plane<float>& saturated, const merge::Motion& motion);
+  /// Keeps the values of a frame, and which are saturated, if it has less light than all before, or as little and is
+  /// the first of them whose displacement was found. @return whether it is kept
+  bool add(const FrameElectrons& frame, double light, const Plane<float>& saturated, const merge::Motion& motion);
+  /// States where the frame that was kept last matches the reference, as Comparison has it; empty: everywhere.
+  void set_matches(Plane<std::uint8_t> block_matches) { least_matches_ = std::move(block_matches); }
 
-  /// Replaces blocks that lack values by those of the frame of least light: the reference is saturated there, and the
-  /// others do not match it, because something moved. All sites of a block then show the scene of one frame: colours
-  /// would be wrong if some were of the reference, and others of another frame.
-  void fill_unmatched(merge::MosaicMean& mean) const;
+  /// Fills sites without a value by those of the frame of least light. Where that frame does not match the reference,
+  /// because something moved, blocks in which the reference is saturated are replaced: all of their sites then show the
+  /// scene of that frame, as colours would be wrong if some were of the reference and others of another frame.
+  void fill_unmatched(merge::MosaicMean& mean);
 
-  /// Returns 1 where the frame of least light is saturated, or where it has no site and the reference is; else 0.
+  /// Returns 1 where the frame of least light is saturated, else 0. NaN outside of it, until fill_unmatched() sets 1
+  /// there where the reference is saturated.
   PlaneView<const float> saturated() const { return saturated_.view(); }
 
  private:
-  /// Returns whether a block has sites without a value at which the frame of least light has one.
-  bool lacks_values(const merge::MosaicMean& mean, int left, int top) const;
+  /// Returns whether a site has no value, and the frame of least light has one.
+  bool is_missing(const merge::MosaicMean& mean, int x, int y) const;
+  /// Returns whether a block has missing sites at which the reference is saturated.
+  bool lacks_values(const merge::MosaicMean& mean, const Rect& block) const;
+  void fill_block(merge::MosaicMean& mean, const Rect& block);
 
   int width_, height_;
   Executor& executor_;
-  Plane<float> saturated_;
-  Plane<float> least_e_;  // values of the frame of least light, in its own light; NaN where it has none
+  Plane<float> reference_saturated_;   // 1 where it is, else 0
+  Plane<float> saturated_;             // see saturated()
+  Plane<float> least_e_;               // values of the frame of least light, in its own light; NaN where it has none
+  Plane<std::uint8_t> least_matches_;  // blocks
   double least_light_ = 1;
+  bool is_aligned_ = true;         // the displacement of that frame is known
   PerSite<double> variance_e2_{};  // of that frame without light
 };
 

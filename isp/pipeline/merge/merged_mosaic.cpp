@@ -195,7 +195,7 @@ void encode_merged(merge::MosaicMean& mean, const FrameElectrons& reference, Pla
   if (out.bracket) {
     mark_saturated(merged.value, weight, saturated, site_white_e, executor);
     out.frame.noise = residual_profile(merged, site_variance(weight, reference.phase, executor), site_white_e,
-                                       levels.rounding_variance());
+                                       levels.rounding_variance(), ProfileFit::least);
     out.frame.noise->reduced = false;
     out.frame.noise_ratio = noise_ratio(
         weight, [&](int x, int y) { return variance_at(weight, x, y, 0); },
@@ -222,7 +222,8 @@ void encode_merged(merge::MosaicMean& mean, const FrameElectrons& reference, Pla
                                  .signal_at_white_e = site_white_e,
                                  .charge_at_white_e = site_white_e},
                                 frame.raw, levels, executor);
-  // White is that of the frame of least light, and so is the exposure time that luminances are computed with.
+  // Luminances are computed with the time in which the reference would have collected the least light of the frames:
+  // white is the saturation of that exposure.
   if (out.bracket && out.frame.raw.info.exposure_s) *out.frame.raw.info.exposure_s *= least_light;
   out.frame.colour = std::move(frame.colour);
   out.frame.corrections = std::move(frame.corrections);

@@ -229,9 +229,10 @@ Result<void> MovedMerge::add(FrameElectrons& frame, int index) {
   if (!motion) return {};
   Executor& executor = work_.executor;
   Plane<float> site_weight;
+  bool is_least = false;  // of the frames of a bracket so far
   if (bracket_) {
     use.light = bracket_->measured_light(view_of(work_.reference), frame, *motion, *stated);
-    bracket_->add(frame, use.light, saturated, *motion);
+    is_least = bracket_->add(frame, use.light, saturated, *motion);
     site_weight = bracket_->placed_weights(frame, use.light, *motion);
     work_.clock.lap("exposure ratio");
   }
@@ -245,6 +246,8 @@ Result<void> MovedMerge::add(FrameElectrons& frame, int index) {
   merge::Comparison found =
       work_.compared(placed_, merge::noise_in_light(frame.variance_e2, use.light),
                      {.block_false_alarm = work_.options.false_alarm, .displacement_error_px = error_px}, index);
+  if (is_least)
+    bracket_->set_matches(found.block_matches.empty() ? Plane<std::uint8_t>() : found.block_matches.clone());
   add_matching({frame, *motion, use.light, differences_, placed_, site_weight}, found.block_matches, index);
   work_.clock.lap("mean");
   return {};

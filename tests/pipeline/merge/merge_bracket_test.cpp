@@ -157,6 +157,53 @@ TEST(MergeBracket, WhereSomethingMovedSaturatedBlocksShowOneFrame) {
   }
 }
 
+TEST(MergeBracket, ADefectOfTheReferenceDoesNotReplaceItsBlock) {
+  Burst burst{.width = 384, .height = 256};
+  burst.light = [](int index) { return std::array{1.0, 1.0 / 16}[static_cast<std::size_t>(index)]; };
+  burst.scene = [](double x, double y, int colour) { return test::textured(x, y, colour, 400); };
+  const Rect object{32, 40, 64, 48};
+  burst.disturb = [&](RawFrame& frame, int index) {
+    if (index == 0) frame.corrections.defects = {{61, 61, 1, 1}};
+    for (int y = object.y; y < object.y + object.height; ++y) {
+      for (int x = object.x; x < object.x + object.width; ++x) {
+        const double e = index == 0 ? 900 : 2000.0 / 16;
+        frame.raw.dn.at(x, y) =
+            static_cast<std::uint16_t>(std::lround(test::night_black_dn + test::night_gain_dn_per_e * e));
+      }
+    }
+  };
+  const MergedRaw merged = burst.merged(2, {.alignment = MergeAlignment::none});
+  const double white_e = test::night_full_e() / merged.frames[1].light;
+  for (int y = object.y + 8; y < object.y + object.height - 8; ++y) {
+    for (int x = object.x + 8; x < object.x + object.width - 8; ++x) {
+      ASSERT_NEAR(Burst::signal_e(merged.frame, x, y, white_e), 900, 9) << x << ' ' << y;
+    }
+  }
+}
+
+TEST(MergeBracket, NearSaturationOfTheShortestFrameOtherColoursKeepTheirLongExposures) {
+  std::array<double, 2> blue_error{};
+  for (const bool near : {false, true}) {
+    Burst burst{.width = 384, .height = 256};
+    burst.light = [](int index) { return std::array{1.0, 1.0 / 16}[static_cast<std::size_t>(index)]; };
+    const double red_e = (near ? 0.97 : 0.8) * 16 * test::night_full_e();
+    burst.scene = [=](double x, double y, int colour) {
+      if (x < 64 || x >= 192 || y < 64 || y >= 192) return test::textured(x, y, colour, 400);
+      return colour == 0 ? red_e : 300.0;
+    };
+    const MergedRaw merged = burst.merged(2, {.alignment = MergeAlignment::none});
+    const double white_e = test::night_full_e() / merged.frames[1].light;
+    for (int y = 72; y < 184; ++y) {
+      for (int x = 72; x < 184; ++x) {
+        if (colour_at(BayerPhase::grbg, x, y) != CfaColour::blue) continue;
+        blue_error[near ? 1 : 0] += std::pow(Burst::signal_e(merged.frame, x, y, white_e) - 300, 2) / (56.0 * 56);
+      }
+    }
+  }
+  EXPECT_LT(blue_error[0], 1.2 * 304);  // the noise of the long frame
+  EXPECT_LT(blue_error[1], 1.2 * 304);
+}
+
 TEST(MergeBracket, IsFoundWhereverTheExposureChanges) {
   for (const int changed : {1, 2, 4}) {
     Burst burst;
