@@ -140,6 +140,36 @@ TEST(DevelopWithDarkFrame, TheNoiseOfAFileIsThatAboveItsTaggedBlack) {
   }
 }
 
+// Light and dark charge saturate a pixel together: the same light over more dark charge is the same luminance, although
+// it is a larger fraction of what is left below white.
+TEST(DevelopWithDarkFrame, TheLuminanceOfTheSceneDoesNotDependOnTheDarkCharge) {
+  InlineExecutor executor;
+  const auto mean_cd_m2 = [&](int dark_dn, bool knows_noise) {
+    RawFrame frame = scene(SensorLayout::bayer);
+    for (std::size_t i = 0; i < frame.raw.dn.size(); ++i) {
+      frame.raw.dn.data()[i] = static_cast<std::uint16_t>(frame.raw.dn.data()[i] + dark_dn);
+    }
+    frame.raw.black_tag = BlackLevel{.pattern_dn = {256}};
+    frame.raw.info.f_number = 2;
+    frame.raw.info.iso = 1600;
+    frame.raw.info.exposure_s = 0.5;
+    if (knows_noise) frame.noise = NoiseProfile{.scale = {1e-3, 1e-3, 1e-3}, .offset = {1e-7, 1e-7, 1e-7}};
+    DevelopOptions options;
+    options.look.look = Look::eye;
+    options.dark_frame = dark_of(256 + dark_dn, false);
+    const auto plan = plan_develop(frame, options, executor);
+    EXPECT_TRUE(plan) << plan.error().message;
+    return plan->rendering.look->mean_cd_m2;
+  };
+  for (const bool knows_noise : {false, true}) {
+    const double expected = mean_cd_m2(0, knows_noise);
+    EXPECT_GT(expected, 0.001);
+    for (const int dark_dn : {10, 1000, 9000}) {
+      EXPECT_NEAR(mean_cd_m2(dark_dn, knows_noise), expected, 1e-5 * expected) << dark_dn << " DN, " << knows_noise;
+    }
+  }
+}
+
 TEST(DevelopWithDarkFrame, ADarkOfAnotherSizeIsAnError) {
   InlineExecutor executor;
   DevelopOptions options = camera_float;

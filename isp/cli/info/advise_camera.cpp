@@ -21,6 +21,7 @@
 #include "isp/model/spectrum/cie_data.h"
 #include "isp/model/spectrum/spectral_data.h"
 #include "isp/model/spectrum/spectral_response.h"
+#include "isp/pipeline/plan/dark_charge.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/to_linear.h"
 
@@ -309,7 +310,8 @@ Result<RawLuminance> raw_luminance(const RawFrame& frame, const FrameInfo& info,
   if (!(median > 0)) {
     return fail(ErrorCode::insufficient, "half of the green pixels are not above black; give --luminance");
   }
-  return RawLuminance{median * *saturation_cd_m2, highlight * *saturation_cd_m2, highlight >= clipped};
+  const double white_cd_m2 = isp::light_range_of(frame, {.black = *black}) * *saturation_cd_m2;
+  return RawLuminance{median * white_cd_m2, highlight * white_cd_m2, highlight >= clipped};
 }
 
 }  // namespace lowlux::cli

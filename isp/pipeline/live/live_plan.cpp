@@ -260,8 +260,8 @@ Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame)
   } else {
     memory_.assign(blocks_.begin(), blocks_.end());
     rendered_largest(thumbnail_.mean, out.white_gain, *balanced, largest_);
-    const AutoExposure automatic =
-        auto_exposure_reordering(memory_, largest_, noise_std, exposure_options(frame.raw.info, plan_.options));
+    const AutoExposure automatic = auto_exposure_reordering(
+        memory_, largest_, noise_std, exposure_options(frame.raw.info, thumbnail_, plan_.options));
     out.exposure_ev = smooth_exposure(automatic.ev);
     out.exposure_rule = name_of(automatic.rule);
   }

@@ -171,10 +171,29 @@ std::string warning_of(const DarkCharge& dark, const FrameInfo& info) {
       *info.exposure_s, place, 100 * *dark.max_fraction);
 }
 
-Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels& levels) {
+double light_range_of(const RawFrame& frame, const RawLevels& levels) {
+  const RawDn& raw = frame.raw;
+  std::optional<PerSite<double>> dark_dn;
+  if (levels.black.holds == BlackPoint::Holds::pedestal_and_dark &&
+      (raw.black_tag || levels.stated_dark_dn != PerSite<double>{})) {
+    dark_dn = dark_of_black_point(frame, levels);
+  }
+  double sum = 0;
+  for (int site = 0; site < 4; ++site) {
+    const double range_dn = white_at(raw, site) - levels.black.pedestal_dn[site];
+    double share = dark_dn ? range_dn / (range_dn + (*dark_dn)[site]) : 1;
+    if (levels.electrons_at_white) share *= light_at_white_e(levels)[site] / (*levels.electrons_at_white)[site];
+    sum += share / 4;
+  }
+  return sum > 0 && std::isfinite(sum) ? sum : 1;
+}
+
+Thumbnail light_of(const Thumbnail& thumbnail, const RawFrame& frame, const RawLevels& levels) {
+  const RawDn& raw = frame.raw;
   Thumbnail out{.mean = CameraRgb(thumbnail.mean.width(), thumbnail.mean.height()),
                 .clipped = thumbnail.clipped.clone(),
-                .black_noise_std = thumbnail.black_noise_std};
+                .black_noise_std = thumbnail.black_noise_std,
+                .light_range = light_range_of(frame, levels)};
   std::array<double, 3> electrons{1, 1, 1}, light_e{1, 1, 1};
   if (levels.electrons_at_white) {
     electrons = electrons_by_colour(raw, levels);

@@ -43,8 +43,12 @@ DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, cons
 std::string warning_of(const DarkCharge& dark, const FrameInfo& info);
 
 /// Returns the thumbnail without the dark charge that is known and still in the codes, which is not light, in fractions
-/// of light_at_white_e.
-Thumbnail light_of(const Thumbnail& thumbnail, const RawDn& raw, const RawLevels& levels);
+/// of light_at_white_e; its light_range is light_range_of().
+Thumbnail light_of(const Thumbnail& thumbnail, const RawFrame& frame, const RawLevels& levels);
+
+/// Returns Thumbnail::light_range: a pixel is saturated by light and dark charge together, so that white is less light
+/// than the exposure alone tells (saturation_luminance_cd_m2).
+double light_range_of(const RawFrame& frame, const RawLevels& levels);
 
 /// Returns alpha of thesis Eq. 4.24 for the median of the light of the blocks: the fraction of X + Y + Z that is light,
 /// were the dark charge not subtracted; 1 - alpha of the saturation would then be lost. Without colour matrices it is

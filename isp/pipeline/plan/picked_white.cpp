@@ -139,7 +139,7 @@ Result<Vector3> picked_neutral(const RawFrame& measured, const RawLevels& levels
   Thumbnail mean{.mean = CameraRgb(1, 1), .clipped = Plane<float>(1, 1)};
   mean.clipped.at(0, 0) = 0;
   for (std::size_t c = 0; c < 3; ++c) mean.mean.plane[c].at(0, 0) = static_cast<float>(sums.colour[c].mean());
-  const Thumbnail light = light_of(mean, raw, levels);
+  const Thumbnail light = light_of(mean, measured, levels);
   const Vector3 gains = mean_gains(measured, *region, executor);
   Vector3 out{};
   for (std::size_t c = 0; c < 3; ++c) {

@@ -155,7 +155,7 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   append(plan.warnings, found.warnings);
   clock.lap("defects");
 
-  const Thumbnail light = light_of(thumbnail, frame.raw, *levels);
+  const Thumbnail light = light_of(thumbnail, frame, *levels);
   Result<Vector3> picked{Vector3{1, 1, 1}};
   if (options.white_balance.mode == WhiteBalanceChoice::Mode::picked && options.space != OutputSpace::camera) {
     picked = picked_neutral(measured, *levels, options, executor);

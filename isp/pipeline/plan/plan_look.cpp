@@ -128,7 +128,9 @@ double mean_of(std::span<const float> values) {
 }
 
 // Returns the luminance of the white level [cd/m2]: from the exposure, or such that the mean is as given.
-Result<double> white_level_cd_m2(const RawFrame& frame, double mean, LookPlan& look, const LookChoice& choice) {
+Result<double> white_level_cd_m2(const RawFrame& frame, const FrameLight& light, LookPlan& look,
+                                 const LookChoice& choice) {
+  const double mean = std::max(mean_of(light.block_luminance), min_mean);
   if (choice.scene_luminance_cd_m2) {
     look.luminance_rule = "given";
     look.mean_cd_m2 = *choice.scene_luminance_cd_m2;
@@ -144,8 +146,9 @@ Result<double> white_level_cd_m2(const RawFrame& frame, double mean, LookPlan& l
                 "file lacks one; give its mean with --scene-luminance, in cd/m2");
   }
   look.luminance_rule = by_profile ? "profile" : "exposure";
-  look.mean_cd_m2 = mean * *saturation;
-  return *saturation;
+  const double white_cd_m2 = light.light_range * *saturation;
+  look.mean_cd_m2 = mean * white_cd_m2;
+  return white_cd_m2;
 }
 
 // Returns the light of an even field, as the eye adapts to it.
@@ -293,8 +296,7 @@ Result<std::optional<LookPlan>> plan_look(const RawFrame& frame, const FrameLigh
   eye.pixels_per_degree = std::max(size.width, size.height) / choice.field_of_view_deg;
   double white_cd_m2 = 100;
   if (choice.look != Look::camera) {
-    const Result<double> found =
-        white_level_cd_m2(frame, std::max(mean_of(light.block_luminance), min_mean), look, choice);
+    const Result<double> found = white_level_cd_m2(frame, light, look, choice);
     if (!found) return tl::make_unexpected(found.error());
     white_cd_m2 = *found;
     decide_eye(light, white_cd_m2, options, look);

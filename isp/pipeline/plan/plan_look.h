@@ -23,6 +23,7 @@ struct FrameLight {
   double exposure_ev = 0;
   Matrix3 balanced = identity3();  // result of balanced_to_output()
   double headroom_ev = 0;          // by which the tone curve's range is extended
+  double light_range = 1;          // Thumbnail::light_range
 };
 
 /// Decides the look: how bright the scene was, how an eye adapted to it perceives it, which effects that requires, and

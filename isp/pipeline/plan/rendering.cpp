@@ -118,14 +118,15 @@ Result<WhiteBalance> with_white(Result<WhiteBalance> balance, const RawFrame& fr
               "the white balance of the file is not a colour that a light can have: try --wb 5500, or --space camera");
 }
 
-void decide_exposure(const FrameInfo& info, const DevelopOptions& options, std::span<const float> luminance,
-                     std::span<const float> largest, double black_noise_std, Rendering& out) {
+void decide_exposure(const AutoExposureOptions& automatically, const DevelopOptions& options,
+                     std::span<const float> luminance, std::span<const float> largest, double black_noise_std,
+                     Rendering& out) {
   if (options.exposure_ev) {
     out.exposure_ev = *options.exposure_ev;
     out.exposure_rule = "given";
     return;
   }
-  const AutoExposure automatic = auto_exposure(luminance, largest, black_noise_std, exposure_options(info, options));
+  const AutoExposure automatic = auto_exposure(luminance, largest, black_noise_std, automatically);
   out.exposure_ev = automatic.ev + options.exposure_offset_ev;
   out.exposure_rule = name_of(automatic.rule);
 }
@@ -199,9 +200,10 @@ void rendered_largest(const CameraRgb& blocks, const std::array<float, 3>& white
   }
 }
 
-AutoExposureOptions exposure_options(const FrameInfo& info, const DevelopOptions& options) {
+AutoExposureOptions exposure_options(const FrameInfo& info, const Thumbnail& light, const DevelopOptions& options) {
   AutoExposureOptions out;
   if (options.look.look == Look::camera) out.white_cd_m2 = saturation_luminance_cd_m2(info);
+  if (out.white_cd_m2) *out.white_cd_m2 *= light.light_range;
   return out;
 }
 
@@ -242,15 +244,15 @@ Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light
   rendered_luminance(light.mean, options.space, out.white_gain, *balanced, blocks);
   rendered_largest(light.mean, out.white_gain, *balanced, largest);
   const double noise_std = light.black_noise_std * *std::ranges::max_element(out.white_gain);
-  decide_exposure(frame.raw.info, options, blocks, largest, noise_std, out);
+  decide_exposure(exposure_options(frame.raw.info, light, options), options, blocks, largest, noise_std, out);
   const bool has_curve = has_profile_curve(options, out.white);
   if (has_curve) {
     options.tone = ToneCurve::none;
     if (!options.exposure_ev) out.exposure_ev += std::log2(options.profile_tables->curve->mid_grey / mid_grey);
   }
   const double headroom = headroom_ev(out.white_gain, options);
-  Result<std::optional<LookPlan>> look =
-      plan_look(frame, {blocks, noise_std, out.white, out.exposure_ev, *balanced, headroom}, options);
+  Result<std::optional<LookPlan>> look = plan_look(
+      frame, {blocks, noise_std, out.white, out.exposure_ev, *balanced, headroom, light.light_range}, options);
   if (!look) return tl::make_unexpected(std::move(look.error()));
   out.look = *std::move(look);
   if (out.look) out.exposure_ev += out.look->dimming_ev;

@@ -72,7 +72,7 @@ void rendered_largest(const CameraRgb& blocks, const std::array<float, 3>& white
 
 /// Returns the options of an automatic exposure. The luminance of the scene follows from f-number, exposure time and
 /// ISO speed where they are known; with a look it is left to that.
-AutoExposureOptions exposure_options(const FrameInfo& info, const DevelopOptions& options);
+AutoExposureOptions exposure_options(const FrameInfo& info, const Thumbnail& light, const DevelopOptions& options);
 
 /// Returns the kernels' transform for exposure and limit of `rendering`. Camera RGB is written unchanged; all other
 /// spaces are clipped where the first channel saturates, so that clipped colours are neutral, unless highlights are

@@ -17,6 +17,8 @@ struct Thumbnail {
   /// Fraction of the samples of each block that are at white or above. Blocks of live frames are not examined: 0.
   Plane<float> clipped;
   double black_noise_std = 0;  // noise of one raw pixel without light, fraction of white; 0 if unknown
+  double light_range = 1;      // from black to white, where `mean` is 1, fraction of the range from pedestal to white:
+                               // below 1 where dark charge is known to fill part of it
 };
 
 /// Accumulates the sums of a thumbnail row by row, while a frame is being read. It reserves its memory in the
