@@ -207,15 +207,18 @@ void list_hot_pixels(const GainProfile& gain, const RawDn& frame, ProfileAtFrame
 std::optional<NoiseProfile> noise_above(const BlackPoint& black, const ProfileAtFrame& found, const RawDn& frame) {
   if (!found.sensor) return std::nullopt;
   PerSite<double> variance_dn2{};
+  const bool has_masked = black.source == BlackPoint::Source::masked_pixels;
+  const bool has_dark_frame = black.source == BlackPoint::Source::dark_frame && found.pedestal_dn &&
+                              black.holds == BlackPoint::Holds::pedestal_and_dark;
   for (int site = 0; site < 4; ++site) {
     variance_dn2[site] = dark_variance_dn2(*found.sensor, found.dark_mean_e[site]);
-    if (black.source != BlackPoint::Source::masked_pixels) continue;
+    if (!has_masked && !has_dark_frame) continue;
     const auto measured = isp::masked_variance_dn2(
         {.gain_dn_per_e = found.sensor->system_gain_dn_per_e,
          .read_variance_dn2 = dark_variance_dn2(*found.sensor, 0),
          .level_dn = black.pedestal_dn[site],
          .pedestal_dn = found.pedestal_dn ? std::optional((*found.pedestal_dn)[site]) : std::nullopt,
-         .std_dn = black.noise_std_dn[site]});
+         .std_dn = has_masked ? black.noise_std_dn[site] : 0});
     variance_dn2[site] = measured.value_or(variance_dn2[site]);
   }
   return by_channel(frame, found.sensor->system_gain_dn_per_e, black.pedestal_dn, variance_dn2);

@@ -38,9 +38,9 @@ Result<ProfileAtFrame> profile_at(const CameraProfile& profile, const RawDn& fra
                                   const std::string& gain_setting = {});
 
 /// Returns the noise of a frame relative to white minus the subtracted black point. If the black point was measured on
-/// masked pixels of the frame, the dark charge is theirs (isp::masked_variance_dn2), not that of the profile at a
-/// temperature that may have been assumed; else it is `found.dark_mean_e`. nullopt if the gain is unknown, or black is
-/// not below white.
+/// masked pixels of the frame, or on dark frames, the dark charge is theirs (isp::masked_variance_dn2), not that of the
+/// profile at a temperature that may have been assumed; else it is `found.dark_mean_e`. nullopt if the gain is unknown,
+/// or black is not below white.
 std::optional<NoiseProfile> noise_above(const BlackPoint& black, const ProfileAtFrame& found, const RawDn& frame);
 
 /// Returns a profile's colour calibrations in the form of a frame: at most two, as in a DNG, for the illuminants of

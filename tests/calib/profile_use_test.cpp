@@ -134,6 +134,14 @@ TEST(ProfileUse, ALevelThatDriftedAddsNoNoiseThatMaskedPixelsDoNotShow) {
   BlackPoint tagged = masked_black(0, 0);
   tagged.source = BlackPoint::Source::tag;  // nothing was measured: the charge is the profile's
   EXPECT_NEAR(green_variance_dn2(*noise_above(tagged, *found, raw), tagged), reading + 40, 1e-3);
+  BlackPoint dark_frame = masked_black(300, 999);  // the temporal noise of a dark frame is not that of the image
+  dark_frame.source = BlackPoint::Source::dark_frame;
+  EXPECT_NEAR(green_variance_dn2(*noise_above(dark_frame, *found, raw), dark_frame), reading + 40, 1e-3)
+      << "the charge in the dark frame is not known apart from its pedestal";
+  found->pedestal_dn.emplace(PerSite<double>{500, 501, 502, 503});
+  EXPECT_NEAR(green_variance_dn2(*noise_above(dark_frame, *found, raw), dark_frame), reading + 300, 1e-3);
+  dark_frame.holds = BlackPoint::Holds::pedestal_only;  // a bias frame lacks the dark charge of the image
+  EXPECT_NEAR(green_variance_dn2(*noise_above(dark_frame, *found, raw), dark_frame), reading + 40, 1e-3);
   tagged.pedestal_dn.fill(20000);
   EXPECT_FALSE(noise_above(tagged, *found, raw)) << "black is not below white";
 }

@@ -26,6 +26,7 @@
 #include "isp/cli/shared/picture_options.h"
 #include "isp/cli/shared/profile_option.h"
 #include "isp/cli/shared/standard_streams.h"
+#include "isp/raw/subtract_dark_frame.h"
 
 namespace lowlux::cli {
 namespace {
@@ -45,12 +46,14 @@ Result<void> check_free(const std::string& output, isp::Overwrite overwrite) {
 /// @param without_dark  the dark frame was subtracted when the file was read
 Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame, bool without_dark) {
   isp::DevelopOptions options = options_of_goal(batch, frame);
+  std::optional<calib::ProfileAtFrame> of_profile;
   if (batch.profile) {
     const ProfileChoice choice{.everything = !batch.args.profile.empty(),
                                .with_darks = batch.darks != nullptr,
                                .gain_setting = batch.args.gain_setting};
-    const auto used = use_profile(*batch.profile, choice, frame, options);
+    auto used = use_profile(*batch.profile, choice, frame, options);
     if (!used) return tl::make_unexpected(used.error());
+    of_profile = *std::move(used);
   }
   if (batch.flat) {
     if (const auto used = use_flat(*batch.flat, frame); !used) return tl::make_unexpected(used.error());
@@ -60,6 +63,14 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame, 
   if (!dark) return tl::make_unexpected(dark.error());
   options.dark_frame = std::move(*dark);
   options.black = batch.options.black;  // the darks include it
+  if (of_profile && of_profile->noise) {
+    const auto level = isp::black_of(frame.raw, *options.dark_frame);
+    const auto above = level ? calib::noise_above(*level, *of_profile, frame.raw) : std::nullopt;
+    if (above) {
+      frame.noise->scale = above->scale;
+      frame.noise->offset = above->offset;
+    }
+  }
   return options;
 }
 

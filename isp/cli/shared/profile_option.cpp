@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "calib/profile/profile_io.h"
-#include "calib/profile/profile_use.h"
 #include "capture/file/file_bytes.h"
 #include "isp/base/text.h"
 #include "isp/model/sensor/sensor_db.h"
@@ -54,11 +53,11 @@ std::string camera_of(const CameraProfile& profile) {
 
 }  // namespace
 
-Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choice, RawFrame& frame,
-                         isp::DevelopOptions& options) {
+Result<calib::ProfileAtFrame> use_profile(const CameraProfile& profile, const ProfileChoice& choice, RawFrame& frame,
+                                          isp::DevelopOptions& options) {
   isp::BlackRequest& black = options.black;
   auto found = calib::profile_at(profile, frame.raw, choice.gain_setting);
-  if (!found) return tl::make_unexpected(found.error());
+  if (!found) return found;
   const bool knows_dark = found->dark_mean_e != PerSite<double>{};
   if (frame.raw.is_float() && !choice.everything) {
     return fail(ErrorCode::unsupported,
@@ -86,7 +85,7 @@ Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choi
   defects.insert(defects.end(), found->hot_pixels.begin(), found->hot_pixels.end());
   frame.warnings.insert(frame.warnings.end(), found->warnings.begin(), found->warnings.end());
   if (choice.everything) use_colours(profile, frame, options.look);
-  return {};
+  return found;
 }
 
 Result<CameraProfile> read_profile(const std::string& path) {

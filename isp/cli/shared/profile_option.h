@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "calib/profile/profile_use.h"
 #include "isp/base/camera_profile.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
@@ -13,7 +14,8 @@ namespace lowlux::cli {
 /// Selects the parts of a camera's profile that are used.
 struct ProfileChoice {
   bool everything = false;   // includes its colour matrices
-  bool with_darks = false;   // dark frames give the level: the noise is that of the profile, the same for all images
+  bool with_darks = false;   // dark frames are going to give the level: the noise, from which they are made, is that of
+                             // the profile, the same for all images
   std::string gain_setting;  // as in calib::gain_named; empty: by the frame's ISO
 };
 
@@ -24,8 +26,9 @@ struct ProfileChoice {
 /// is that above this black point. So are the ISO speed of the setting and the camera, for looks that need the
 /// luminance and the light of the scene. Errors: those of calib::profile_at; without `everything` a profile without a
 /// black level.
-Result<void> use_profile(const CameraProfile& profile, const ProfileChoice& choice, RawFrame& frame,
-                         isp::DevelopOptions& options);
+/// @return what the profile states at the setting of the frame, for calib::noise_above another black point
+Result<calib::ProfileAtFrame> use_profile(const CameraProfile& profile, const ProfileChoice& choice, RawFrame& frame,
+                                          isp::DevelopOptions& options);
 
 /// Reads a profile from a JSON file. Errors: the file is unreadable; those of calib::parse_profile, with the key's
 /// path.
