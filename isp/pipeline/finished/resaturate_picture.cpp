@@ -1,6 +1,7 @@
 #include "isp/pipeline/finished/resaturate_picture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -46,43 +47,60 @@ double fraction_of_dark(const RgbView<const float>& xyz, const Plane<std::uint8_
   return static_cast<double>(below) / static_cast<double>(mean.size());
 }
 
-/// Returns X - x0 S (k = 0) or Y - y0 S (k = 1), mean over the square of `side` pixels at (x, y).
-double chroma_at(const RgbView<const float>& xyz, int k, int x, int y, int side) {
-  const Vector3 white = vector_of(*xyz_of(white_d65));
-  const double share = white[k] / (white[0] + white[1] + white[2]);
-  double sum = 0;
-  for (int j = y; j < y + side; ++j) {
-    for (int i = x; i < x + side; ++i) sum += xyz[k].at(i, j) - share * intensity_at(xyz, i, j);
-  }
-  return sum / (side * side);
-}
+/// Mean intensity S of a square of 2 x 2 smaller squares, and the absolute diagonal Haar details of X - x0 S and of
+/// Y - y0 S between these.
+struct SquareDetail {
+  double intensity = 0;
+  std::array<double, 2> detail{};
+};
 
-/// Returns 1.4826 times the median of the absolute diagonal Haar details of means over squares; the mean of both
-/// chromas.
-double median_detail(const RgbView<const float>& xyz, int side) {
-  double mean = 0;
-  for (int k = 0; k < 2; ++k) {
-    std::vector<double> details;
-    for (int y = 0; y + 2 * side <= xyz[0].height; y += 2 * side) {
-      for (int x = 0; x + 2 * side <= xyz[0].width; x += 2 * side) {
-        const double detail = chroma_at(xyz, k, x, y, side) - chroma_at(xyz, k, x + side, y, side) -
-                              chroma_at(xyz, k, x, y + side, side) + chroma_at(xyz, k, x + side, y + side, side);
-        if (std::isfinite(detail)) details.push_back(std::abs(detail / 2));
+/// @param side  of the smaller squares [px]
+SquareDetail detail_at(const RgbView<const float>& xyz, int x, int y, int side) {
+  const Vector3 white = vector_of(*xyz_of(white_d65));
+  const double sum_of_white = white[0] + white[1] + white[2];
+  SquareDetail out;
+  for (int j = y; j < y + 2 * side; ++j) {
+    for (int i = x; i < x + 2 * side; ++i) {
+      const double intensity = intensity_at(xyz, i, j), sign = (i < x + side) == (j < y + side) ? 1 : -1;
+      out.intensity += intensity / (4 * side * side);
+      for (int k = 0; k < 2; ++k) {
+        out.detail[k] += sign * (xyz[k].at(i, j) - white[k] / sum_of_white * intensity) / (2 * side * side);
       }
     }
-    if (details.empty()) return 0;
-    const auto middle = details.begin() + static_cast<std::ptrdiff_t>(details.size() / 2);
-    std::nth_element(details.begin(), middle, details.end());
-    mean += 1.4826 * *middle / 2;
+  }
+  for (double& detail : out.detail) detail = std::abs(detail);
+  return out;
+}
+
+/// Returns 1.4826 times the median of the details of the darkest tenth of the squares that are brighter than `dark`;
+/// the mean of both chromas.
+double median_detail(const RgbView<const float>& xyz, double dark, int side) {
+  constexpr std::size_t least = 64;
+  std::vector<SquareDetail> squares;
+  for (int y = 0; y + 2 * side <= xyz[0].height; y += 2 * side) {
+    for (int x = 0; x + 2 * side <= xyz[0].width; x += 2 * side) {
+      const SquareDetail square = detail_at(xyz, x, y, side);
+      if (square.intensity > dark && std::isfinite(square.detail[0] + square.detail[1])) squares.push_back(square);
+    }
+  }
+  if (squares.empty()) return 0;
+  const auto n = static_cast<std::ptrdiff_t>(std::min(squares.size(), std::max(squares.size() / 10, least)));
+  std::nth_element(squares.begin(), squares.begin() + (n - 1), squares.end(),
+                   [](const auto& a, const auto& b) { return a.intensity < b.intensity; });
+  double mean = 0;
+  for (int k = 0; k < 2; ++k) {
+    std::nth_element(squares.begin(), squares.begin() + n / 2, squares.begin() + n,
+                     [k](const auto& a, const auto& b) { return a.detail[k] < b.detail[k]; });
+    mean += 1.4826 * squares[static_cast<std::size_t>(n / 2)].detail[k] / 2;
   }
   return mean;
 }
 
 }  // namespace
 
-double chroma_noise_of(const RgbView<const float>& xyz) {
+double chroma_noise_of(const RgbView<const float>& xyz, double dark) {
   double largest = 0;
-  for (const int side : {1, 2, 4}) largest = std::max(largest, side * median_detail(xyz, side));
+  for (const int side : {1, 2, 4}) largest = std::max(largest, side * median_detail(xyz, dark, side));
   return largest;
 }
 
@@ -91,14 +109,14 @@ Resaturated resaturate_picture(SceneLinear xyz, const ResaturateOptions& options
   const Plane<std::uint8_t> saturated = saturated_pixels(std::as_const(xyz).view(), to_rgb);
   denoise::Resaturation how;
   how.dark = options.black;
-  how.chroma_noise = options.chroma_noise ? *options.chroma_noise : chroma_noise_of(std::as_const(xyz).view());
+  const double dark = options.black.x + options.black.y + options.black.z;
+  how.chroma_noise = options.chroma_noise ? *options.chroma_noise : chroma_noise_of(std::as_const(xyz).view(), dark);
   how.prior_std = options.prior_std;
   how.radius = options.radius;
   how.xyz_to_rgb = to_rgb;
   how.saturated = saturated.view();
   Resaturated out;
   out.chroma_noise = how.chroma_noise;
-  const double dark = options.black.x + options.black.y + options.black.z;
   out.fraction_dark = fraction_of_dark(std::as_const(xyz).view(), saturated, dark, options.radius);
   const auto at_white = std::count(saturated.data(), saturated.data() + saturated.size(), std::uint8_t{1});
   out.fraction_saturated = static_cast<double>(at_white) / static_cast<double>(saturated.size());

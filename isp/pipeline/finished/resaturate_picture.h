@@ -26,11 +26,14 @@ struct Resaturated {
   double fraction_saturated = 0;  // fraction of saturated pixels, which are unchanged
 };
 
-/// Returns the standard deviation of X - x0 S and of Y - y0 S (S = X + Y + Z, neutral D65) in flat areas, the mean of
-/// both: 1.4826 times the median of diagonal Haar details' absolute values. Demosaicing and JPEG leave little of it
-/// between neighbours, so means over squares of 2 and 4 pixels are evaluated too, times 2 and 4, and the largest
-/// counts. Returns 0 for images of fewer than 2 x 2 pixels.
-double chroma_noise_of(const RgbView<const float>& xyz);
+/// Returns the standard deviation of X - x0 S and of Y - y0 S (S = X + Y + Z, neutral D65) in flat dark areas, where
+/// the black point reduces saturation most; the mean of both: 1.4826 times the median of the absolute values of
+/// diagonal Haar details, in the darkest tenth of the image that is brighter than the black point. The texture of
+/// brighter areas would count as noise. Demosaicing and JPEG leave little of the noise between neighbours, so means
+/// over squares of 2 and 4 pixels are evaluated too, times 2 and 4, and the largest counts. Returns 0 for images of
+/// fewer than 2 x 2 pixels.
+/// @param dark  X + Y + Z of the black point
+double chroma_noise_of(const RgbView<const float>& xyz, double dark);
 
 /// Applies denoise::resaturate to an image in XYZ, and encodes the result in an output space without tone curve. Pixels
 /// with a channel at white are saturated.
