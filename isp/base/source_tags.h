@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace lowlux {
@@ -25,5 +26,11 @@ struct SourceTags {
 
 /// Returns the bytes of the values of all tags.
 std::size_t bytes_of(const SourceTags& tags);
+
+/// Returns the tag of a list; null if it has none.
+const SourceTag* find_tag(const std::vector<SourceTag>& tags, std::uint16_t id);
+
+/// Returns an ASCII tag of a list up to its first zero byte; empty if there is none or it is of another type.
+std::string text_of(const std::vector<SourceTag>& tags, std::uint16_t id);
 
 }  // namespace lowlux

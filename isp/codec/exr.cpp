@@ -16,6 +16,7 @@
 #include <vector>
 
 #include <ImfChannelList.h>
+#include <ImfFloatAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfIO.h>
@@ -88,6 +89,35 @@ void set_text(Imf::Header& header, const char* name, const std::string& text) {
   if (!text.empty()) header.insert(name, Imf::StringAttribute(text));
 }
 
+/// Returns the sum of the unsigned fractions of a tag, each divided by 60 once more: degrees, minutes and seconds.
+std::optional<double> degrees_of(const std::vector<SourceTag>& tags, std::uint16_t id) {
+  const SourceTag* tag = find_tag(tags, id);
+  if (tag == nullptr || tag->type != 5 || tag->values.size() % 8 != 0) return std::nullopt;
+  double sum = 0, unit = 1;
+  for (std::size_t at = 0; at < tag->values.size(); at += 8, unit /= 60) {
+    std::array<std::uint32_t, 2> terms{};  // little-endian, as this machine is
+    std::memcpy(terms.data(), tag->values.data() + at, 8);
+    sum += unit * terms[0] / terms[1];
+  }
+  return std::isfinite(sum) ? std::optional(sum) : std::nullopt;
+}
+
+void add_source_tags(const SourceTags& tags, Imf::Header& header) {
+  set_text(header, "comments", text_of(tags.main, 270));
+  set_text(header, "owner", text_of(tags.main, 315));
+  set_text(header, "copyright", text_of(tags.main, 33432));
+  set_text(header, "cameraSerialNumber", text_of(tags.exif, 42033));
+  set_text(header, "lensMake", text_of(tags.exif, 42035));
+  set_text(header, "lensModel", text_of(tags.exif, 42036));
+  set_text(header, "lensSerialNumber", text_of(tags.exif, 42037));
+  const auto north = degrees_of(tags.gps, 2), east = degrees_of(tags.gps, 4), height_m = degrees_of(tags.gps, 6);
+  if (north) Imf::addLatitude(header, static_cast<float>(text_of(tags.gps, 1) == "S" ? -*north : *north));
+  if (east) Imf::addLongitude(header, static_cast<float>(text_of(tags.gps, 3) == "W" ? -*east : *east));
+  const SourceTag* below = find_tag(tags.gps, 5);
+  const bool is_below = below != nullptr && !below->values.empty() && below->values[0] == std::byte{1};
+  if (height_m) Imf::addAltitude(header, static_cast<float>(is_below ? -*height_m : *height_m));
+}
+
 Imf::Header header_of(const SceneLinear& picture, const FileMetadata& metadata, const ExrOptions& options) {
   Imf::Header header(picture.width(), picture.height());
   const bool piz = options.compression == ExrOptions::Compression::piz;
@@ -108,6 +138,10 @@ Imf::Header header_of(const SceneLinear& picture, const FileMetadata& metadata, 
   set_text(header, "cameraMake", info.make);
   set_text(header, "cameraModel", info.model);
   set_text(header, "software", info.software);
+  if (usable(info.focal_length_mm)) {
+    header.insert("nominalFocalLength", Imf::FloatAttribute(static_cast<float>(*info.focal_length_mm)));
+  }
+  if (metadata.source_tags) add_source_tags(*metadata.source_tags, header);
   return header;
 }
 

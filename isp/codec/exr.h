@@ -18,9 +18,9 @@ struct ExrOptions {
   enum class Compression : std::uint8_t { none, piz } compression = Compression::none;
 };
 
-/// Writes scene-linear R, G, B channels. `metadata.chromaticities`, `white_luminance_cd_m2` if it is positive, and the
-/// exposure time, f-number, ISO, camera and time of `metadata.info` become attributes; an OpenEXR file cannot hold an
-/// ICC profile.
+/// Writes scene-linear R, G, B channels. `metadata.chromaticities`, `white_luminance_cd_m2` if it is positive, the
+/// exposure time, f-number, ISO, focal length, camera and time of `metadata.info`, and of its source tags caption,
+/// author, copyright, lens, serial numbers and place become attributes; an OpenEXR file cannot hold an ICC profile.
 /// @param file open for writing, at its start
 Result<void> encode_exr(const SceneLinear& picture, const FileMetadata& metadata, const ExrOptions& options,
                         std::FILE* file);

@@ -32,7 +32,7 @@ struct FileMetadata {
   std::vector<std::byte> icc;   // ICC profile; empty: none (PNG, JPEG, TIFF)
   std::vector<std::byte> exif;  // EXIF block from its TIFF header on, without "Exif\0\0"; empty: none (PNG, JPEG)
   FrameInfo info;               // stored in the format's own fields (TIFF, OpenEXR)
-  std::shared_ptr<const SourceTags> source_tags;  // tags of the raw file, to be added as they are (TIFF); null: none
+  std::shared_ptr<const SourceTags> source_tags;  // tags of the raw file, to be added (TIFF, OpenEXR); null: none
   std::optional<Chromaticities> chromaticities;   // OpenEXR
   std::optional<double> white_luminance_cd_m2;    // luminance of RGB (1, 1, 1) (OpenEXR whiteLuminance)
 };

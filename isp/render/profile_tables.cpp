@@ -20,11 +20,6 @@ constexpr std::uint16_t tone_curve = 50940;
 constexpr std::uint16_t type_short = 3, type_long = 4, type_float = 11;
 constexpr float max_shift = 360, max_factor = 1000;
 
-const SourceTag* find(const SourceTags& tags, std::uint16_t id) {
-  const auto at = std::ranges::find(tags.main, id, &SourceTag::id);
-  return at == tags.main.end() ? nullptr : &*at;
-}
-
 std::uint32_t word_at(const SourceTag& tag, std::size_t i, std::size_t bytes) {
   std::uint32_t out = 0;
   for (std::size_t b = 0; b < bytes; ++b) out |= std::to_integer<std::uint32_t>(tag.values[i * bytes + b]) << (8 * b);
@@ -51,7 +46,7 @@ struct Form {
 };
 
 std::optional<Form> form_of(const SourceTags& tags, std::uint16_t dims_id, std::uint16_t encoding_id) {
-  const SourceTag* const dims_tag = find(tags, dims_id);
+  const SourceTag* const dims_tag = find_tag(tags.main, dims_id);
   const auto dims = dims_tag == nullptr ? std::nullopt : words_of(*dims_tag, 3);
   if (!dims) return std::nullopt;
   const auto [hues, saturations, values] = *dims;
@@ -61,7 +56,7 @@ std::optional<Form> form_of(const SourceTags& tags, std::uint16_t dims_id, std::
   }
   Form out{static_cast<int>(hues), static_cast<int>(saturations), static_cast<int>(values), false};
   if (out.nodes() > max_hue_sat_nodes) return std::nullopt;
-  if (const SourceTag* const encoding = find(tags, encoding_id)) {
+  if (const SourceTag* const encoding = find_tag(tags.main, encoding_id)) {
     const auto which = words_of(*encoding, 1);
     if (!which || (*which)[0] > 1) return std::nullopt;
     out.srgb_encoded = (*which)[0] == 1;
@@ -101,9 +96,9 @@ void warn(const char* table, std::vector<std::string>& warnings) {
 }
 
 void read_maps(const SourceTags& tags, bool two_maps, ProfileTables& out, std::vector<std::string>& warnings) {
-  const SourceTag* const first = find(tags, map_data_1);
-  const SourceTag* const second = find(tags, map_data_2);
-  if (first == nullptr && second == nullptr && find(tags, map_dims) == nullptr) return;
+  const SourceTag* const first = find_tag(tags.main, map_data_1);
+  const SourceTag* const second = find_tag(tags.main, map_data_2);
+  if (first == nullptr && second == nullptr && find_tag(tags.main, map_dims) == nullptr) return;
   if (const auto form = form_of(tags, map_dims, map_encoding)) {
     out.low = table_of(*form, first);
     if (two_maps) out.high = table_of(*form, second);
@@ -116,14 +111,15 @@ void read_maps(const SourceTags& tags, bool two_maps, ProfileTables& out, std::v
 }
 
 void read_look(const SourceTags& tags, ProfileTables& out, std::vector<std::string>& warnings) {
-  if (find(tags, look_data) == nullptr && find(tags, look_dims) == nullptr) return;
-  if (const auto form = form_of(tags, look_dims, look_encoding)) out.look = table_of(*form, find(tags, look_data));
+  if (find_tag(tags.main, look_data) == nullptr && find_tag(tags.main, look_dims) == nullptr) return;
+  if (const auto form = form_of(tags, look_dims, look_encoding))
+    out.look = table_of(*form, find_tag(tags.main, look_data));
   if (!out.look) warn("look table", warnings);
   if (!changes(out.look)) out.look.reset();
 }
 
 void read_curve(const SourceTags& tags, ProfileTables& out, std::vector<std::string>& warnings) {
-  const SourceTag* const tag = find(tags, tone_curve);
+  const SourceTag* const tag = find_tag(tags.main, tone_curve);
   if (tag == nullptr) return;
   const bool is_whole = tag->type == type_float && tag->count % 2 == 0 && tag->count <= 2 * max_curve_points &&
                         tag->values.size() == std::size_t{4} * tag->count;

@@ -3,9 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <limits>
+#include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "tests/codec/pictures.h"
 
@@ -94,6 +100,74 @@ TEST(Exr, ChromaticitiesAndExposureComeBack) {
   EXPECT_EQ(read.info.model, "Model 1");
   EXPECT_EQ(read.info.software, "lowlux 1");
   EXPECT_EQ(read.info.date_time, "2024:02:03 04:05:06");
+}
+
+TEST(Exr, CaptionAuthorLensAndPlaceBecomeAttributes) {
+  const auto text = [](std::uint16_t id, std::string_view words) {
+    SourceTag tag{.id = id, .type = 2, .count = static_cast<std::uint32_t>(words.size() + 1)};
+    for (const char c : words) tag.values.push_back(static_cast<std::byte>(c));
+    tag.values.push_back(std::byte{0});
+    return tag;
+  };
+  const auto fractions = [](std::uint16_t id, const std::vector<std::uint32_t>& terms) {
+    SourceTag tag{.id = id, .type = 5, .count = static_cast<std::uint32_t>(terms.size() / 2)};
+    for (const std::uint32_t term : terms) {
+      for (int i = 0; i < 4; ++i) tag.values.push_back(static_cast<std::byte>(term >> (8 * i) & 255U));
+    }
+    return tag;
+  };
+  SourceTags tags;
+  tags.main = {text(270, "A bridge"), text(315, "An author"), text(33432, "A right")};
+  tags.exif = {text(42033, "C1"), text(42035, "Maker"), text(42036, "A Lens 24-70"), text(42037, "L2")};
+  tags.gps = {text(1, "S"),
+              fractions(2, {33, 1, 51, 1, 30, 1}),
+              text(3, "W"),
+              fractions(4, {70, 1, 30, 1, 0, 1}),
+              SourceTag{5, 1, 1, {std::byte{1}}},
+              fractions(6, {25, 2})};
+  FileMetadata metadata;
+  metadata.info.focal_length_mm = 35;
+  metadata.source_tags = std::make_shared<const SourceTags>(tags);
+  const auto header = [&] {
+    const std::vector<std::byte> bytes = exr_of(noisy_linear(5, 4), Depth::half, metadata);
+    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  };
+  const auto attribute = [](const std::string& file, const std::string& name, const std::string& type) {
+    const std::string key = name + '\0' + type + '\0';
+    const std::size_t at = file.find(key);
+    if (at == std::string::npos) return std::string("absent");
+    std::uint32_t size = 0;
+    std::memcpy(&size, file.data() + at + key.size(), sizeof size);
+    return file.substr(at + key.size() + sizeof size, size);
+  };
+  const auto number = [&](const std::string& file, const std::string& name) {
+    float value = NAN;
+    const std::string bytes = attribute(file, name, "float");
+    if (bytes.size() == sizeof value) std::memcpy(&value, bytes.data(), sizeof value);
+    return value;
+  };
+  const std::string file = header();
+  for (const auto& [name, words] : std::vector<std::pair<std::string, std::string>>{{"comments", "A bridge"},
+                                                                                    {"owner", "An author"},
+                                                                                    {"copyright", "A right"},
+                                                                                    {"cameraSerialNumber", "C1"},
+                                                                                    {"lensMake", "Maker"},
+                                                                                    {"lensModel", "A Lens 24-70"},
+                                                                                    {"lensSerialNumber", "L2"}}) {
+    EXPECT_EQ(attribute(file, name, "string"), words) << name;
+  }
+  EXPECT_FLOAT_EQ(number(file, "latitude"), -(33 + 51 / 60.0F + 30 / 3600.0F));
+  EXPECT_FLOAT_EQ(number(file, "longitude"), -70.5F);
+  EXPECT_FLOAT_EQ(number(file, "altitude"), -12.5F);
+  EXPECT_FLOAT_EQ(number(file, "nominalFocalLength"), 35);
+  // Damaged tags are left out: a divisor of 0, and a text of another type.
+  tags.gps[1] = fractions(2, {33, 0, 51, 1, 30, 1});
+  tags.main[1].type = 7;
+  metadata.source_tags = std::make_shared<const SourceTags>(tags);
+  const std::string damaged = header();
+  EXPECT_EQ(attribute(damaged, "latitude", "float"), "absent");
+  EXPECT_EQ(attribute(damaged, "owner", "string"), "absent");
+  EXPECT_EQ(attribute(damaged, "comments", "string"), "A bridge");
 }
 
 TEST(Exr, TheLuminanceOfWhiteComesBackIfItIsOne) {

@@ -104,12 +104,19 @@ TEST(IccProfile, ProfilesAreNamedAfterTheirSpace) {
   EXPECT_EQ(name(OutputSpace::rec2020), "Rec. 2020");
   EXPECT_EQ(name(OutputSpace::linear_srgb), "Linear sRGB");
   EXPECT_EQ(name(OutputSpace::linear_rec2020), "Linear Rec. 2020");
+  EXPECT_EQ(name(OutputSpace::xyz), "CIE XYZ, white D65");
 }
 
-TEST(IccProfile, SpacesNoRgbProfileDescribesHaveNone) {
-  EXPECT_TRUE(icc_profile(OutputSpace::xyz).empty());
-  EXPECT_TRUE(icc_profile(OutputSpace::camera).empty());
+TEST(IccProfile, ReadersOfXyzSeeXyz) {
+  constexpr Xy icc_d50{0.9642 / (0.9642 + 1 + 0.8249), 1 / (0.9642 + 1 + 0.8249)};
+  const Matrix3 to_d50 = *bradford_adaptation(white_d65, icc_d50);
+  for (const Vector3& xyz : {Vector3{0.9505, 1, 1.089}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.2, 0.1, 0.7}}) {
+    const Vector3 expected = to_d50 * xyz, seen = read_by_profile(OutputSpace::xyz, xyz);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(seen[i], expected[i], 1e-4) << i;
+  }
 }
+
+TEST(IccProfile, ASpaceThatNoRgbProfileDescribesHasNone) { EXPECT_TRUE(icc_profile(OutputSpace::camera).empty()); }
 
 /// A reader that converts RGB of these chromaticities to XYZ must get the numbers it started from.
 TEST(ChromaticitiesOf, XyzAreThoseThatLeaveXyzAsItIs) {

@@ -61,9 +61,7 @@ double baseline_exposure_ev(const RawFrame& frame, const DngWriteOptions& option
 
 /// Returns whether the tags of the source hold opcodes.
 bool has_opcodes(const RawFrame& frame) {
-  if (!frame.source_tags) return false;
-  const auto& tags = frame.source_tags->main;
-  return std::any_of(tags.begin(), tags.end(), [](const SourceTag& tag) { return tag.id == opcode_list3; });
+  return frame.source_tags && find_tag(frame.source_tags->main, opcode_list3) != nullptr;
 }
 
 /// Returns whether a tag belongs to the source's camera profile, which refers to its colour matrices. That of a
@@ -86,13 +84,8 @@ Result<void> add_tags_of_source(std::FILE* file, const RawFrame& frame) {
 
 /// Returns the caption that the source has in its ImageDescription; empty if there is none or it is blank.
 std::string caption_of(const RawFrame& frame) {
-  constexpr std::uint16_t ascii = 2;
   if (!frame.source_tags) return {};
-  const auto& tags = frame.source_tags->main;
-  const auto found = std::ranges::find(tags, TIFFTAG_IMAGEDESCRIPTION, &SourceTag::id);
-  if (found == tags.end() || found->type != ascii) return {};
-  std::string text(reinterpret_cast<const char*>(found->values.data()), found->values.size());
-  text.resize(std::min(text.find('\0'), text.size()));
+  std::string text = text_of(frame.source_tags->main, TIFFTAG_IMAGEDESCRIPTION);
   text.resize(text.find_last_not_of(' ') + 1);
   return text;
 }

@@ -12,6 +12,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr Chromaticities xyz_axes{{1, 0}, {0, 1}, {0, 0}, {1.0 / 3, 1.0 / 3}};
+constexpr Vector3 icc_d50{0.9642, 1.0, 0.8249};  // ICC.1:2022 section 7.2.16
 
 Chromaticities to_chromaticities(const RgbPrimaries& p) {
   const auto xy = [](const Xy& from) { return Chromaticities::Xy{from.x, from.y}; };
@@ -51,6 +52,7 @@ const char* profile_name(OutputSpace space) {
     case OutputSpace::linear_rec2020:
       return "Linear Rec. 2020";
     case OutputSpace::xyz:
+      return "CIE XYZ, white D65";
     case OutputSpace::camera:
       break;
   }
@@ -72,6 +74,17 @@ Curve curve_of(cmsContext context, OutputSpace space) {
 bool set_text(cmsContext context, cmsHPROFILE profile, cmsTagSignature tag, const char* words) {
   const Text text(cmsMLUalloc(context, 1));
   return text != nullptr && cmsMLUsetASCII(text.get(), "en", "US", words) && cmsWriteTag(profile, tag, text.get());
+}
+
+/// Makes the axes of XYZ, adapted to the D50 of profiles, the colorants of a profile.
+bool set_colorants_of_xyz(cmsHPROFILE profile) {
+  constexpr std::array tags{cmsSigRedColorantTag, cmsSigGreenColorantTag, cmsSigBlueColorantTag};
+  const Matrix3 to_d50 = *bradford_adaptation(white_d65, *xy_of(xyz_of(icc_d50)));
+  for (std::size_t c = 0; c < tags.size(); ++c) {
+    const cmsCIEXYZ colorant{to_d50[0][c], to_d50[1][c], to_d50[2][c]};
+    if (!cmsWriteTag(profile, tags[c], &colorant)) return false;
+  }
+  return true;
 }
 
 std::vector<std::byte> bytes_of(cmsHPROFILE profile) {
@@ -114,8 +127,9 @@ std::optional<Chromaticities> chromaticities_of(OutputSpace space) {
 }
 
 std::vector<std::byte> icc_profile(OutputSpace space) {
-  const auto c = chromaticities_of(space);
-  if (!c || space == OutputSpace::xyz) return {};
+  const bool is_xyz = space == OutputSpace::xyz;
+  const auto c = is_xyz ? to_chromaticities(primaries_rec709) : chromaticities_of(space);
+  if (!c) return {};
   const Context context(cmsCreateContext(nullptr, nullptr));
   const Curve curve = curve_of(context.get(), space);
   if (curve == nullptr) return {};
@@ -123,7 +137,7 @@ std::vector<std::byte> icc_profile(OutputSpace space) {
   const cmsCIExyYTRIPLE primaries{{c->red.x, c->red.y, 1}, {c->green.x, c->green.y, 1}, {c->blue.x, c->blue.y, 1}};
   std::array<cmsToneCurve*, 3> curves{curve.get(), curve.get(), curve.get()};
   const Profile profile(cmsCreateRGBProfileTHR(context.get(), &white, &primaries, curves.data()));
-  if (profile == nullptr) return {};
+  if (profile == nullptr || (is_xyz && !set_colorants_of_xyz(profile.get()))) return {};
   if (!set_text(context.get(), profile.get(), cmsSigProfileDescriptionTag, profile_name(space)) ||
       !set_text(context.get(), profile.get(), cmsSigCopyrightTag, "No copyright, use freely")) {
     return {};
