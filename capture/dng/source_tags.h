@@ -20,8 +20,8 @@ namespace lowlux::capture {
 std::shared_ptr<const SourceTags> dng_source_tags(std::span<const std::byte> file, const DngFile& dng,
                                                   std::vector<std::string>& warnings);
 
-/// Returns the tags of another raw file that are passed on: author, copyright, XMP, IPTC, EXIF and GPS tags, without
-/// the maker note (find_exif); null if the file has no EXIF data. Limits as above.
+/// Returns the tags of another raw file, or of the EXIF block of an image, that are passed on: author, copyright, XMP,
+/// IPTC, EXIF and GPS tags, without the maker note (find_exif); null if there are no EXIF data. Limits as above.
 std::shared_ptr<const SourceTags> raw_source_tags(std::span<const std::byte> file, std::vector<std::string>& warnings);
 
 }  // namespace lowlux::capture

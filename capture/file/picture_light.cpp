@@ -142,7 +142,8 @@ Survey survey_of(const SceneLinear& picture, Executor& executor) {
   return all;
 }
 
-Result<void> check_radiance(const SceneLinear& picture, Executor& executor, std::vector<std::string>& warnings) {
+Result<void> check_radiance(const SceneLinear& picture, Executor& executor, Negatives negatives,
+                            std::vector<std::string>& warnings) {
   const Survey survey = survey_of(picture, executor);
   if (survey.not_finite.found()) {
     return fail(ErrorCode::malformed,
@@ -154,7 +155,7 @@ Result<void> check_radiance(const SceneLinear& picture, Executor& executor, std:
                             " % of the samples are negative, down to " + number_text(survey.least, 3);
   const double fraction = survey.negative_sum / (survey.positive_sum + survey.negative_sum);
   const std::string light = number_text(100 * fraction, 3) + " % of its light";
-  if (fraction > max_negative_fraction) {
+  if (negatives == Negatives::few && fraction > max_negative_fraction) {
     return fail(ErrorCode::malformed, found + ", " + light + " and more than the " +
                                           number_text(100 * max_negative_fraction) +
                                           " % that filters leave: clip the picture at 0 if that is meant");
@@ -176,8 +177,9 @@ Result<SceneLinear> light_of(const Encoded16& picture, const DisplayColour& colo
 }
 
 Result<SceneLinear> light_of(const SceneLinear& picture, const Matrix3& to_xyz, Orientation orientation,
-                             Executor& executor, std::vector<std::string>& warnings) {
-  if (auto sound = check_radiance(picture, executor, warnings); !sound) return tl::make_unexpected(sound.error());
+                             Executor& executor, std::vector<std::string>& warnings, Negatives negatives) {
+  if (auto sound = check_radiance(picture, executor, negatives, warnings); !sound)
+    return tl::make_unexpected(sound.error());
   const Placement p = placement_of(picture.width(), picture.height(), orientation);
   SceneLinear xyz(p.width, p.height);
   std::vector<Place> beyond(static_cast<std::size_t>(executor.width()));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -17,9 +18,16 @@ Result<SceneLinear> light_of(const Encoded8& picture, const DisplayColour& colou
 Result<SceneLinear> light_of(const Encoded16& picture, const DisplayColour& colour, Orientation orientation,
                              Executor& executor);
 
-/// Converts linear RGB to upright XYZ. Values that are not radiance are an error, or set to 0 with a warning: see
-/// read_picture.
+/// States what becomes of negative values, which are not radiance: each becomes 0, with a warning that states their
+/// number and their fraction of the light.
+enum class Negatives : std::uint8_t {
+  few,  // above a twentieth of the light they are an error
+  any
+};
+
+/// Converts linear RGB to upright XYZ. Values that are not finite are an error.
 Result<SceneLinear> light_of(const SceneLinear& picture, const Matrix3& to_xyz, Orientation orientation,
-                             Executor& executor, std::vector<std::string>& warnings);
+                             Executor& executor, std::vector<std::string>& warnings,
+                             Negatives negatives = Negatives::few);
 
 }  // namespace lowlux::capture

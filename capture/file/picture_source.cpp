@@ -3,15 +3,17 @@
 #include <cmath>
 #include <cstdint>
 #include <new>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <variant>
 
+#include "capture/dng/dng_info.h"
 #include "capture/dng/dng_tags.h"
+#include "capture/dng/source_tags.h"
 #include "capture/file/file_bytes.h"
 #include "capture/file/pass_on.h"
 #include "capture/file/picture_colour.h"
-#include "capture/file/picture_light.h"
 #include "isp/base/text.h"
 #include "isp/codec/exr.h"
 #include "isp/codec/jpeg.h"
@@ -126,43 +128,63 @@ void read_luminance(const isp::FileMetadata& metadata, ScenePicture& scene) {
   }
 }
 
-Result<SceneLinear> light_of_picture(const isp::DecodedPicture& decoded, Executor& executor,
+Result<SceneLinear> light_of_picture(const isp::DecodedPicture& decoded, Executor& executor, Negatives negatives,
                                      std::vector<std::string>& warnings) {
   const isp::FileMetadata& metadata = decoded.metadata;
   if (const auto* codes = std::get_if<Encoded8>(&decoded.picture)) return light_of_display(*codes, metadata, executor);
   if (const auto* codes = std::get_if<Encoded16>(&decoded.picture)) return light_of_display(*codes, metadata, executor);
   auto matrix = matrix_of_floats(metadata);
   if (!matrix) return pass_on(matrix);
-  return light_of(std::get<SceneLinear>(decoded.picture), *matrix, orientation_of(metadata), executor, warnings);
+  return light_of(std::get<SceneLinear>(decoded.picture), *matrix, orientation_of(metadata), executor, warnings,
+                  negatives);
 }
 
-Result<ScenePicture> read_bytes(std::span<const std::byte> bytes, Executor& executor, const isp::DecodeLimits& limits) {
+/// Reads what the file states of camera, exposure, author, lens and place: from its EXIF block, or as a TIFF.
+void read_metadata(std::span<const std::byte> file, const isp::FileMetadata& metadata, ScenePicture& scene) {
+  scene.info = metadata.info;
+  const std::span<const std::byte> block = metadata.exif.empty() ? file : std::span(metadata.exif);
+  const auto tiff = TiffFile::open(block);
+  if (!tiff) return;
+  auto main = tiff->directory(tiff->first_directory());
+  if (!main) return;
+  scene.source_tags = raw_source_tags(block, scene.warnings);
+  std::optional<TiffDirectory> exif;
+  if (const auto offset = main->whole(tag::exif_ifd); offset && *offset) {
+    if (auto directory = tiff->directory(**offset)) exif = *std::move(directory);
+  }
+  scene.info = read_info({.main = *std::move(main), .exif = std::move(exif)});
+}
+
+Result<ScenePicture> read_bytes(std::span<const std::byte> bytes, Executor& executor, const isp::DecodeLimits& limits,
+                                Negatives negatives) {
   auto decode = decoder_of(bytes);
   if (!decode) return pass_on(decode);
   auto decoded = (*decode)(bytes, limits);
   if (!decoded) return pass_on(decoded);
   ScenePicture scene;
-  auto xyz = light_of_picture(*decoded, executor, scene.warnings);
+  auto xyz = light_of_picture(*decoded, executor, negatives, scene.warnings);
   if (!xyz) return pass_on(xyz);
   scene.xyz = *std::move(xyz);
   read_luminance(decoded->metadata, scene);
+  read_metadata(bytes, decoded->metadata, scene);
   return scene;
 }
 
 }  // namespace
 
-Result<ScenePicture> read_picture(const std::string& path, Executor& executor, const isp::DecodeLimits& limits) try {
+Result<ScenePicture> read_picture(const std::string& path, Executor& executor, const isp::DecodeLimits& limits,
+                                  Negatives negatives) try {
   const auto pixels = static_cast<std::uint64_t>(limits.max_pixels);
   auto bytes = read_file_bytes(path, bytes_per_pixel * pixels + bytes_of_metadata);
   if (!bytes) return pass_on(bytes);
-  return read_picture(*bytes, path, executor, limits);
+  return read_picture(*bytes, path, executor, limits, negatives);
 } catch (const std::bad_alloc&) {
   return fail(ErrorCode::too_large, "there is not enough memory for this file", path);
 }
 
 Result<ScenePicture> read_picture(std::span<const std::byte> bytes, const std::string& name, Executor& executor,
-                                  const isp::DecodeLimits& limits) try {
-  auto scene = read_bytes(bytes, executor, limits);
+                                  const isp::DecodeLimits& limits, Negatives negatives) try {
+  auto scene = read_bytes(bytes, executor, limits, negatives);
   if (!scene) scene.error().where = name;
   return scene;
 } catch (const std::bad_alloc&) {

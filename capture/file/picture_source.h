@@ -1,11 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "capture/file/picture_light.h"
 #include "isp/base/executor.h"
+#include "isp/base/frame.h"
 #include "isp/base/image.h"
 #include "isp/base/result.h"
 #include "isp/codec/picture_file.h"
@@ -20,8 +23,10 @@ struct ScenePicture {
   SceneLinear xyz;
   /// Whether the file states the luminance of Y = 1 (OpenEXR whiteLuminance).
   bool absolute = false;
-  double white_luminance_cd_m2 = 0;   // luminance of Y = 1; 0 unless `absolute`
-  std::vector<std::string> warnings;  // one line each
+  double white_luminance_cd_m2 = 0;               // luminance of Y = 1; 0 unless `absolute`
+  FrameInfo info;                                 // camera and exposure, as far as the file states them
+  std::shared_ptr<const SourceTags> source_tags;  // author, lens, place and the like (raw_source_tags); null: none
+  std::vector<std::string> warnings;              // one line each
 };
 
 /// Reads PNG, JPEG, TIFF, OpenEXR, PFM or PPM, identified by their first bytes, to scene-linear light.
@@ -30,14 +35,14 @@ struct ScenePicture {
 /// else as sRGB. EXIF orientation is honoured. Floats: linear; primaries of the OpenEXR chromaticities or of a linear
 /// ICC profile, else Rec. 709. Alpha is dropped.
 ///
-/// Errors: the file or its format (codec); NaN and infinite values, with their pixel; profiles of other kinds. Negative
-/// values are not radiance: they become 0, with a warning that states their number and their fraction of the light;
-/// above a twentieth of it they are an error.
+/// Errors: the file or its format (codec); NaN and infinite values, with their pixel; profiles of other kinds; negative
+/// values, unless `negatives` allows them.
 /// @param executor  its threads process the rows
-Result<ScenePicture> read_picture(const std::string& path, Executor& executor, const isp::DecodeLimits& limits = {});
+Result<ScenePicture> read_picture(const std::string& path, Executor& executor, const isp::DecodeLimits& limits = {},
+                                  Negatives negatives = Negatives::few);
 
 /// Reads an image from the bytes of a file; errors refer to it as `name`.
 Result<ScenePicture> read_picture(std::span<const std::byte> bytes, const std::string& name, Executor& executor,
-                                  const isp::DecodeLimits& limits = {});
+                                  const isp::DecodeLimits& limits = {}, Negatives negatives = Negatives::few);
 
 }  // namespace lowlux::capture

@@ -116,6 +116,24 @@ TEST_F(CompareCommand, LinearFloatsAreTheSamePictureAsTheCodesTheyStandFor) {
   EXPECT_GT(json["psnr_db"], 90);  // -20 log10 of 3e-5, of two such steps
 }
 
+TEST_F(CompareCommand, TakesNegativeValuesOfNoiseAsBlackWithAWarning) {
+  SceneLinear signed_light(48, 32), clipped(48, 32);
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < signed_light.plane[c].size(); ++i) {
+      const float value = (i + c) % 2 == 0 ? 0.02F : -0.01F;
+      signed_light.plane[c].data()[i] = value;
+      clipped.plane[c].data()[i] = std::max(value, 0.0F);
+    }
+  }
+  InlineExecutor one;
+  ASSERT_TRUE(isp::write_picture(Picture(std::move(signed_light)), OutputSpace::xyz, {}, file("a.tif"), {}, one));
+  ASSERT_TRUE(isp::write_picture(Picture(std::move(clipped)), OutputSpace::xyz, {}, file("b.exr"), {}, one));
+  const auto result = compare("a.tif", "b.exr", {"--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_LT(Json::parse(result.out)["ciede2000"]["largest"], 0.02) << "a TIFF of XYZ is read as XYZ, and half floats";
+  EXPECT_NE(result.err.find("50 % of the samples are negative, down to -0.01"), std::string::npos) << result.err;
+}
+
 TEST_F(CompareCommand, RefusesWhatCannotBeCompared) {
   write("a.png", paint);
   write("wide.png", paint, 50);

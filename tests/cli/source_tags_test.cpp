@@ -250,6 +250,38 @@ TEST_F(SourceTagsCommand, LensAndPlaceReachFinishedImages) {
   }
 }
 
+TEST_F(SourceTagsCommand, SurviveTheConversionOfFinishedImages) {
+  write("a.dng", source_dng(false));
+  for (const std::string source : {"a.jpg", "a.png", "a.tif"}) {
+    run({"develop", file("a.dng"), "-o", file(source), "--force", "--quiet"});
+    const auto before_bytes = bytes_of_file(file(source));
+    const Directories before = directories_of(source == "a.tif" ? before_bytes : exif_of(before_bytes));
+    for (const std::vector<std::string>& verb : std::vector<std::vector<std::string>>{
+             {"retarget", "--display-luminance", "5"}, {"resaturate", "--black", "1,1,1"}}) {
+      for (const std::string result : {"b.jpg", "b.png", "b.tif"}) {
+        std::vector<std::string> words{verb[0], file(source), "-o", file(result), "--force", "--quiet"};
+        words.insert(words.end(), verb.begin() + 1, verb.end());
+        run(words);
+        const auto bytes = bytes_of_file(file(result));
+        const Directories after = directories_of(result == "b.tif" ? bytes : exif_of(bytes));
+        for (const std::uint16_t id : {271, 272, 315, 33432}) {
+          EXPECT_EQ(after.main.at(id), before.main.at(id)) << verb[0] << " " << source << " " << result << " " << id;
+        }
+        for (const std::uint16_t id : {33434, 42034, 42036, 37383}) {
+          ASSERT_TRUE(after.exif.contains(id)) << source << " " << result << " " << id;
+          const auto &was = before.exif.at(id).numbers, &is = after.exif.at(id).numbers;
+          if (id == 33434) {  // libtiff rounds the time to a float
+            EXPECT_NEAR(is[0] / is[1], was[0] / was[1], 2e-7 * was[0] / was[1]);
+          } else {
+            EXPECT_EQ(is, was) << source << " " << result << " " << id;
+          }
+        }
+        EXPECT_EQ(after.gps, before.gps) << source << " " << result;
+      }
+    }
+  }
+}
+
 TEST_F(SourceTagsCommand, ExiftoolAgreesWhereItIsInstalled) {
   if (!std::filesystem::exists("/usr/bin/exiftool")) GTEST_SKIP() << "exiftool is not installed";
   write("a.dng", source_dng(true));

@@ -18,7 +18,7 @@ namespace lowlux::cli {
 namespace {
 
 Result<capture::ScenePicture> read(const std::string& file, Executor& executor) {
-  auto picture = capture::read_picture(file, executor);
+  auto picture = capture::read_picture(file, executor, {}, capture::Negatives::any);
   if (!picture) return fail(picture.error().code, picture.error().message, file);
   return picture;
 }

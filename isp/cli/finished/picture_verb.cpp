@@ -24,13 +24,15 @@ int failed(const PictureVerb& verb, Error error) {
 
 }  // namespace
 
-Result<void> write_made(const PictureVerb& verb, const Picture& picture, OutputSpace space, Executor& executor) {
+Result<void> write_made(const PictureVerb& verb, const Picture& picture, OutputSpace space,
+                        const capture::ScenePicture& source, Executor& executor) {
   isp::WriteOptions write;
   write.overwrite = verb.force ? isp::Overwrite::yes : isp::Overwrite::no;
   write.software = "lowlux " + version_number();
+  write.source_tags = source.source_tags;
   write.jpeg.quality = verb.jpeg_quality;
   write.exr.depth = verb.bits.value_or(16) == 16 ? isp::ExrOptions::Depth::half : isp::ExrOptions::Depth::full;
-  const auto written = isp::write_picture(picture, space, {}, verb.output, write, executor);
+  const auto written = isp::write_picture(picture, space, source.info, verb.output, write, executor);
   if (!written) return fail(written.error().code, written.error().message, verb.output);
   return {};
 }

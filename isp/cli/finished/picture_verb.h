@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/file/picture_source.h"
 #include "isp/base/executor.h"
 #include "isp/base/image.h"
 #include "isp/base/result.h"
@@ -32,7 +33,8 @@ using PictureWork = std::function<Result<std::vector<std::string>>(const Picture
 /// Checks the output before the work, prints warnings and errors after it. @return the exit code
 int run_picture_verb(const PictureVerb& verb, const PictureWork& work);
 
-/// Writes the resulting image to the verb's output.
-Result<void> write_made(const PictureVerb& verb, const Picture& picture, OutputSpace space, Executor& executor);
+/// Writes the resulting image to the verb's output, with the metadata of the source.
+Result<void> write_made(const PictureVerb& verb, const Picture& picture, OutputSpace space,
+                        const capture::ScenePicture& source, Executor& executor);
 
 }  // namespace lowlux::cli

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "capture/file/picture_source.h"
 #include "isp/base/executor.h"
 #include "isp/cli/finished/picture_verb.h"
 #include "isp/cli/finished/resaturate_args.h"
@@ -85,7 +84,7 @@ Result<ResaturateOutcome> worked(const ResaturateArgs& args, const PictureKind& 
                                  .samples = kind.samples};
   out.made = isp::resaturate_picture(std::move(picture->xyz), options, executor);
   add_warnings(out);
-  const auto written = write_made(verb_of(args), out.made.picture, kind.space, executor);
+  const auto written = write_made(verb_of(args), out.made.picture, kind.space, *picture, executor);
   if (!written) return tl::make_unexpected(written.error());
   return out;
 }

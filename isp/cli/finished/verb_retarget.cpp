@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "capture/file/picture_source.h"
 #include "isp/base/executor.h"
 #include "isp/cli/finished/picture_verb.h"
 #include "isp/cli/finished/retarget_args.h"
@@ -44,7 +43,7 @@ Result<RetargetOutcome> worked(const RetargetArgs& args, const PictureKind& kind
   if (!picture) return tl::make_unexpected(picture.error());
   auto made = isp::retarget_picture(picture->xyz, options, kind.samples, executor);
   if (!made) return tl::make_unexpected(made.error());
-  const auto written = write_made(verb_of(args), made->picture, kind.space, executor);
+  const auto written = write_made(verb_of(args), made->picture, kind.space, *picture, executor);
   if (!written) return tl::make_unexpected(written.error());
   return RetargetOutcome{isp::coefficients_name(options), std::move(*made), picture->warnings};
 }
