@@ -7,6 +7,7 @@
 #include "calib/dark/dark_library.h"
 #include "calib/dark/dark_series.h"
 #include "calib/dark/dark_temperature.h"
+#include "calib/dark/light_in_darks.h"
 #include "calib/profile/profile_use.h"
 #include "isp/base/camera_profile.h"
 #include "isp/cli/calibrate/black_report.h"
@@ -20,6 +21,7 @@ namespace lowlux::cli {
 namespace {
 
 constexpr double light_of_range = 0.005;  // maximum excess of the image over the masked pixels
+constexpr double much_light = 0.1;        // of the range above the tagged black level
 constexpr double light_of_noise = 10;     // the maximum in standard deviations of the masked pixels
 
 double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
@@ -57,6 +59,8 @@ struct Darks {
   std::string mosaic;
   isp::Table frames;
   std::vector<std::pair<std::optional<double>, double>> gains_dn_per_e;  // that files state, with the ISO of each
+  std::optional<PerSite<double>> tagged_dn;                              // black level that the files state
+  double white_dn = 0;
 };
 
 /// Returns the system gain that the noise profile of a frame states [DN/e-]; nullopt if there is none.
@@ -87,6 +91,9 @@ Result<Darks> read_darks(const CalibrateBlackArgs& args) {
     out.mosaic = calib::mosaic_of(frame->raw);
     out.files.emplace_back(frame->raw.info.iso, file);
     list_frame(file, args.masked ? "masked pixels" : "dark", frame->raw.info, out.frames);
+    const auto tagged = isp::choose_black(frame->raw, {.choice = isp::BlackChoice::metadata});
+    out.tagged_dn = tagged ? std::optional(tagged->pedestal_dn) : std::nullopt;
+    out.white_dn = *std::ranges::min_element(frame->raw.white_dn);
     if (const auto gain = stated_gain(*frame)) out.gains_dn_per_e.emplace_back(frame->raw.info.iso, *gain);
     const auto dark = dark_part(*std::move(frame), args);
     if (!dark) return tl::make_unexpected(with_file(dark.error(), file));
@@ -95,6 +102,28 @@ Result<Darks> read_darks(const CalibrateBlackArgs& args) {
   }
   out.sets = sorter.sets();
   return out;
+}
+
+/// Warns of frames that light may have reached: those far above the black level of their files, and those that are
+/// brighter on one side.
+void warn_of_light(const calib::DarkGroup& group, const Darks& darks, std::vector<std::string>& warnings) {
+  const PerSite<calib::DarkSite> sites = calib::sites_of(group);
+  if (darks.tagged_dn) {
+    double level_dn = 0;
+    for (const calib::DarkSite& site : sites) level_dn += site.spread.median / 4;
+    const double tagged_dn = mean_of(*darks.tagged_dn),
+                 fraction = (level_dn - tagged_dn) / (darks.white_dn - tagged_dn);
+    if (fraction > much_light) {
+      warnings.push_back(fmt::format(
+          "the frames{} are {:.0f} % of the range above the black level of their files: if this is not dark "
+          "charge but light, cover the lens and take them again",
+          group.setting.exposure_s ? fmt::format(" of {:g} s", *group.setting.exposure_s) : "", 100 * fraction));
+    }
+  }
+  if (!group.setting.exposure_s) return;
+  if (const auto even = calib::check_even_dark(group, sites, darks.tagged_dn); !even) {
+    warnings.push_back(even.error().message);
+  }
 }
 
 struct Gain {
@@ -166,6 +195,9 @@ Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measu
 Result<void> calibrate_set(const calib::DarkSet& set, const Darks& darks, const CalibrateBlackArgs& args,
                            Calibration& found) {
   const calib::Measured measured = measured_on(darks, set.iso);
+  if (!args.masked) {
+    for (const calib::DarkGroup& group : set.groups) warn_of_light(group, darks, found.warnings);
+  }
   if (!tells_dark_current(set)) {
     return calibrate_black_level(set, measured, level_gain(set, darks, args, found.profile), args, found);
   }
