@@ -196,6 +196,12 @@ std::optional<CameraProfile> raspberry_profile(std::string_view sensor) {
   return *std::move(profile);
 }
 
+std::vector<std::string> raspberry_sensors() {
+  std::vector<std::string> names;
+  for (const KnownSensor& sensor : known_sensors) names.emplace_back(sensor.name);
+  return names;
+}
+
 std::optional<RaspberryMatch> find_raspberry_noise(std::string_view make, std::string_view model, double iso,
                                                    double range_dn) {
   if (lower_case(make).find("raspberry") == std::string::npos || !(iso >= 50 && iso <= 6400) || !(range_dn > 0))

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "calib/noise/noise_figures.h"
 #include "isp/base/camera_profile.h"
@@ -60,6 +61,9 @@ std::optional<TunedSensor> tuned_sensor(std::string_view file_name);
 /// Returns the profile of a sensor by its name, "imx477", with the figures of its tuning file (profile_of_tuning).
 /// nullopt for sensors that are not known.
 std::optional<CameraProfile> raspberry_profile(std::string_view sensor);
+
+/// Returns the names of the sensors that raspberry_profile knows.
+std::vector<std::string> raspberry_sensors();
 
 /// Holds what the tuning files state of a frame's sensor.
 struct RaspberryMatch {

@@ -1,5 +1,6 @@
 #include "calib/profile/profile_io.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <initializer_list>
@@ -243,8 +244,16 @@ Result<Json> parsed(std::string_view text) {
         });
     if (failure.error) return tl::make_unexpected(*failure.error);
     return document;
-  } catch (const Json::exception& e) {
-    return fail(ErrorCode::malformed, fmt::format("the profile is not JSON: {}", e.what()));
+  } catch (const Json::parse_error& e) {
+    const std::string_view before = text.substr(0, std::min(e.byte, text.size()));
+    const auto line = 1 + std::ranges::count(before, '\n');
+    return fail(
+        ErrorCode::malformed,
+        fmt::format("the profile is not JSON, or damaged: its line {} cannot be read, near byte {} of {}; restore "
+                    "the file, or calibrate again",
+                    line, e.byte, text.size()));
+  } catch (const Json::exception&) {
+    return fail(ErrorCode::malformed, "the profile is not JSON: restore the file, or calibrate again");
   }
 }
 

@@ -82,7 +82,12 @@ Result<CameraProfile> profile_of_file(const std::string& file) {
 Result<CameraProfile> quoted_profile_of(const std::string& sensor) {
   if (sensor.ends_with(".json")) return profile_of_file(sensor);
   if (auto known = calib::raspberry_profile(sensor)) return *std::move(known);
-  return calib::quoted_profile(sensor);
+  auto profile = calib::quoted_profile(sensor);
+  if (!profile && profile.error().code == ErrorCode::invalid_argument) {
+    profile.error().message +=
+        fmt::format("; for Raspberry Pi cameras {}", fmt::join(calib::raspberry_sensors(), ", "));
+  }
+  return profile;
 }
 
 }  // namespace
