@@ -142,8 +142,7 @@ std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& leve
 }
 
 bool is_denoised_before(const RawFrame& frame, const DenoiseChoice& choice) {
-  return choice.mode == DenoiseChoice::Mode::automatic && !choice.always && frame.noise && frame.noise->reduced &&
-         frame.noise->source == NoiseProfile::Source::picture;
+  return choice.mode == DenoiseChoice::Mode::automatic && !choice.always && frame.noise && frame.noise->reduced;
 }
 
 bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise) {
