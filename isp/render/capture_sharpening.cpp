@@ -14,6 +14,9 @@ constexpr float strength = 1.5f;
 constexpr int window_px = 3;  // reach of the mean of D^2
 constexpr float over_noise = 3;
 constexpr float saturated_from = 0.95f;
+constexpr int ramp_px = 4;
+constexpr int limit_px = 2;
+constexpr float limit_of_least = 0.75f;
 constexpr int cell_px = 4;
 
 /// Returns one half of a Gaussian's coefficients, centre first; all of them sum to 1.
@@ -100,49 +103,63 @@ Plane<float> detail_of(const Plane<float>& plane, const std::vector<float>& half
   return blurred;
 }
 
-/// Returns 1 for pixels within `reach` of a saturated one, 0 for others.
-Plane<float> near_saturation(const CaptureSharpening& how, const RgbView<float>& rgb, int reach, Executor& executor) {
-  const int width = rgb[0].width, height = rgb[0].height;
-  Plane<float> rows(width, height), out(width, height);
-  const auto saturated = [&](int x, int y) {
-    return rgb[0].row(y)[x] >= saturated_from * how.saturation[0] ||
-           rgb[1].row(y)[x] >= saturated_from * how.saturation[1] ||
-           rgb[2].row(y)[x] >= saturated_from * how.saturation[2];
-  };
-  for_each_band(executor, height, [&](const RowBand& band, int /*index*/) {
-    for (int y = band.first; y < band.last; ++y) {
-      float* const row = rows.row(y);
-      std::fill_n(row, width, 0.0f);
-      for (int x = 0; x < width; ++x) {
-        if (saturated(x, y)) std::fill(row + std::max(0, x - reach), row + std::min(width, x + reach + 1), 1.0f);
-      }
-    }
-  });
-  for_each_pixel(width, height, executor, [&](int x, int y) {
-    float most = 0;
-    for (int j = std::max(0, y - reach); j <= std::min(height - 1, y + reach); ++j)
-      most = std::max(most, rows.at(x, j));
-    out.at(x, y) = most;
-  });
-  return out;
-}
-
-/// Returns the mean of the squares over a window, cut off at the borders.
-Plane<float> mean_square(const Plane<float>& detail, Executor& executor) {
-  const int width = detail.width(), height = detail.height();
+/// Returns the mean of value(x, y) over the pixels at most `reach` away along each axis, cut off at the borders.
+template <class Value>
+Plane<float> window_mean(int width, int height, int reach, Executor& executor, const Value& value) {
   Plane<float> rows(width, height), out(width, height);
   for_each_pixel(width, height, executor, [&](int x, int y) {
-    const int from = std::max(0, x - window_px), to = std::min(width - 1, x + window_px);
+    const int from = std::max(0, x - reach), to = std::min(width - 1, x + reach);
     float sum = 0;
-    for (int i = from; i <= to; ++i) sum += detail.at(i, y) * detail.at(i, y);
+    for (int i = from; i <= to; ++i) sum += value(i, y);
     rows.at(x, y) = sum / static_cast<float>(to - from + 1);
   });
   for_each_pixel(width, height, executor, [&](int x, int y) {
-    const int from = std::max(0, y - window_px), to = std::min(height - 1, y + window_px);
+    const int from = std::max(0, y - reach), to = std::min(height - 1, y + reach);
     float sum = 0;
     for (int j = from; j <= to; ++j) sum += rows.at(x, j);
     out.at(x, y) = sum / static_cast<float>(to - from + 1);
   });
+  return out;
+}
+
+/// Returns the least of value(x, y) over the pixels at most `reach` away along each axis.
+template <class Value>
+Plane<float> window_least(int width, int height, int reach, Executor& executor, const Value& value) {
+  Plane<float> rows(width, height), out(width, height);
+  for_each_pixel(width, height, executor, [&](int x, int y) {
+    float least = value(x, y);
+    for (int i = std::max(0, x - reach); i <= std::min(width - 1, x + reach); ++i) least = std::min(least, value(i, y));
+    rows.at(x, y) = least;
+  });
+  for_each_pixel(width, height, executor, [&](int x, int y) {
+    float least = rows.at(x, y);
+    for (int j = std::max(0, y - reach); j <= std::min(height - 1, y + reach); ++j) {
+      least = std::min(least, rows.at(x, j));
+    }
+    out.at(x, y) = least;
+  });
+  return out;
+}
+
+/// Returns the factor of the detail: 0 for pixels within `reach` of a saturated one, rising to 1 over twice ramp_px
+/// farther ones.
+Plane<float> far_from_saturation(const CaptureSharpening& how, const RgbView<float>& rgb, int reach,
+                                 Executor& executor) {
+  const int width = rgb[0].width, height = rgb[0].height;
+  const Plane<float> unsaturated = window_least(width, height, reach + ramp_px, executor, [&](int x, int y) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (rgb[c].row(y)[x] >= saturated_from * how.saturation[c]) return 0.0f;
+    }
+    return 1.0f;
+  });
+  return window_mean(width, height, ramp_px, executor, [&](int x, int y) { return unsaturated.at(x, y); });
+}
+
+/// Returns what each value of a channel is not lowered below: a little less than the least value around.
+Plane<float> lower_limit(const PlaneView<float>& channel, Executor& executor) {
+  Plane<float> out =
+      window_least(channel.width, channel.height, limit_px, executor, [&](int x, int y) { return channel.row(y)[x]; });
+  for (std::size_t i = 0; i < out.size(); ++i) out.data()[i] *= out.data()[i] > 0 ? limit_of_least : 1;
   return out;
 }
 
@@ -175,16 +192,21 @@ void sharpen_capture(const CaptureSharpening& how, PlaneView<const float> varian
     luminance.at(x, y) = sum;
   });
   const Plane<float> detail = detail_of(luminance, half, executor);
-  const Plane<float> signal = mean_square(detail, executor);
+  const Plane<float> signal =
+      window_mean(width, height, window_px, executor, [&](int x, int y) { return detail.at(x, y) * detail.at(x, y); });
   const int reach = (terms + 1) * (static_cast<int>(half.size()) - 1);
-  const Plane<float> left = near_saturation(how, rgb, reach, executor);
+  const Plane<float> allowed = far_from_saturation(how, rgb, reach, executor);
   const auto noise_gain = static_cast<float>(detail_noise_gain(how.blur_px));
-  for_each_pixel(width, height, executor, [&](int x, int y) {
-    const float noise = over_noise * noise_gain * variance.row(y / cell_px)[x / cell_px];
-    const float gain = left.at(x, y) > 0 || !(signal.at(x, y) > noise) ? 0 : 1 - noise / signal.at(x, y);
-    if (gain == 0) return;
-    for (std::size_t c = 0; c < 3; ++c) rgb[c].row(y)[x] += gain * detail.at(x, y);
-  });
+  for (std::size_t c = 0; c < 3; ++c) {
+    const Plane<float> limit = lower_limit(rgb[c], executor);
+    for_each_pixel(width, height, executor, [&](int x, int y) {
+      const float noise = over_noise * noise_gain * variance.row(y / cell_px)[x / cell_px];
+      if (!(allowed.at(x, y) > 0 && signal.at(x, y) > noise)) return;
+      const float gain = allowed.at(x, y) * (1 - noise / signal.at(x, y));
+      float& value = rgb[c].row(y)[x];
+      value = std::max(value + gain * detail.at(x, y), std::min(value, limit.at(x, y)));
+    });
+  }
 }
 
 }  // namespace lowlux::isp

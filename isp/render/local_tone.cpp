@@ -112,9 +112,15 @@ Cells cells_of(const LocalTone& how, const PlaneView<const float>& variance, con
   const int reach = std::max(1, std::max(width, height) / (2 * windows_across));
   Cells out{Plane<float>(width, height), Plane<float>(width, height), Plane<float>(width, height),
             Plane<float>(width, height)};
+  Plane<float> noise_around(width, height);
   for_each_cell(level, executor, [&](int x, int y) {
     const float own = known ? how.limit * std::sqrt(std::max(variance.row(y)[x], 0.0f)) : 0;
-    const float noise = std::max(own, unknown_noise);
+    out.noise.at(x, y) = std::max(own, unknown_noise);
+    noise_around.at(x, y) = std::log2(out.noise.at(x, y));
+  });
+  average(noise_around, reach, executor);
+  for_each_cell(level, executor, [&](int x, int y) {
+    const float noise = std::min(out.noise.at(x, y), std::exp2(noise_around.at(x, y)));
     out.noise.at(x, y) = noise;
     level.at(x, y) = log_level(level.at(x, y), noise);
     out.slope.at(x, y) = level.at(x, y) * level.at(x, y);

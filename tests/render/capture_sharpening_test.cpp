@@ -208,6 +208,44 @@ TEST(CaptureSharpening, PixelsNearSaturationKeepTheirBits) {
   }
 }
 
+// A bright point on a dark background, and a hard edge between two strong colours.
+TEST(CaptureSharpening, LeavesNoDarkRingsOrLines) {
+  SceneLinear in(64, 64);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      const double away = std::hypot(x - 16, y - 32);
+      const auto star = static_cast<float>(0.5 * std::exp(-0.5 * away * away / 0.64));
+      const auto edge = static_cast<float>(1 / (1 + std::exp((x - 48) / 0.4)));
+      in.plane[0].at(x, y) = 0.01F + star + 0.3F * (1 - edge);
+      in.plane[1].at(x, y) = 0.01F + star;
+      in.plane[2].at(x, y) = 0.01F + star + 0.6F * edge * (x > 32 ? 1 : 0);
+    }
+  }
+  for (const float blur : {0.6F, 1.0F, 1.5F}) {
+    const SceneLinear out = sharpened(in, {.blur_px = blur}, 1e-12);
+    for (int c = 0; c < 3; ++c) {
+      for (std::size_t i = 0; i < out.plane[c].size(); ++i) ASSERT_GE(out.plane[c].data()[i], 0.74F * 0.01F) << blur;
+    }
+    EXPECT_GT(out.plane[1].at(16, 32), 1.05F * in.plane[1].at(16, 32)) << "the point is sharpened";
+  }
+}
+
+TEST(CaptureSharpening, BeginsGraduallyAwayFromSaturation) {
+  SceneLinear in(160, 16);  // a line of constant contrast that ends in a saturated place
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      const auto line = static_cast<float>(std::exp(-0.5 * (y - 8) * (y - 8) / 0.36));
+      for (int c = 0; c < 3; ++c) in.plane[c].at(x, y) = x < 4 ? 1.0F : 0.2F + 0.3F * line;
+    }
+  }
+  const SceneLinear out = sharpened(in, {.blur_px = 0.6F}, 1e-12);
+  const auto change = [&](int x) { return out.plane[1].at(x, 8) - in.plane[1].at(x, 8); };
+  EXPECT_EQ(change(10), 0);
+  const float full = change(120);
+  EXPECT_GT(full, 0.02F);
+  for (int x = 4; x < 150; ++x) EXPECT_LT(std::fabs(change(x + 1) - change(x)), full / 6) << x;
+}
+
 TEST(CaptureSharpening, ThreadsChangeNothing) {
   SceneLinear in = blurred_scene(0.6);
   add_noise(in, 0.01, 3);
