@@ -1,10 +1,8 @@
-#include "isp/base/random/philox.h"
+#include "isp/base/random/random.h"
 
 #include <gtest/gtest.h>
 
 #include <vector>
-
-#include "isp/base/random/random.h"
 
 namespace lowlux {
 namespace {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "isp/base/look_grid.h"
-#include "isp/base/random/philox.h"
+#include "isp/base/random/random.h"
 #include "isp/model/appearance/entropy_model.h"
 #include "isp/model/spectrum/cie_data.h"
 #include "isp/model/spectrum/spectral_data.h"

@@ -74,7 +74,7 @@ struct FourWords {
   VU word[4];
 };
 
-/// Returns Philox4x32-10 (philox.h) of the pixels (x, row.y), with x a vector of columns. Even and odd lanes pass the
+/// Returns Philox4x32-10 (random.h) of the pixels (x, row.y), with x a vector of columns. Even and odd lanes pass the
 /// rounds separately, as 64-bit lanes: a word is the low half, and the next round ignores the high half.
 HWY_INLINE FourWords words_of(const Row& row, VU x) {
   const Words w;

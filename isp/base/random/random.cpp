@@ -2,7 +2,6 @@
 
 #include <cassert>
 
-#include "isp/base/random/philox.h"
 #include "isp/base/random/random_rows.h"
 
 namespace lowlux {

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isp/base/random/philox.h"
+#include "isp/base/random/random.h"
 #include "isp/cli/shared/lines.h"
 
 namespace lowlux::cli {

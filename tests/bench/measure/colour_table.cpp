@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "isp/base/random/philox.h"
+#include "isp/base/random/random.h"
 #include "isp/model/appearance/entropy_model.h"
 #include "isp/render/colour_table.h"
 #include "isp/render/colour_table_rows.h"

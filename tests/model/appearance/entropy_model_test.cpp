@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <optional>
 
-#include "isp/base/random/philox.h"
+#include "isp/base/random/random.h"
 #include "isp/model/spectrum/cie_data.h"
 #include "isp/model/vision/mesopic.h"
 #include "tests/support/numbers.h"
