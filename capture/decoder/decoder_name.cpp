@@ -1,6 +1,6 @@
-#include <libraw/libraw_version.h>
+#include "capture/decoder/decoder_name.h"
 
-#include "capture/decoder/libraw_decoder.h"
+#include <libraw/libraw_version.h>
 
 namespace lowlux::capture {
 

@@ -21,7 +21,6 @@
 #include <system_error>
 #include <utility>
 
-#include "capture/decoder/all_bytes.h"
 #include "capture/decoder/decoder_program.h"
 #include "capture/file/pass_on.h"
 #include "isp/base/text.h"

@@ -16,8 +16,6 @@
 #include <optional>
 #include <string_view>
 
-#include "capture/decoder/all_bytes.h"
-
 namespace lowlux::capture {
 namespace {
 

@@ -1,17 +1,21 @@
+// The program lowlux-decode-jxl: see decoder_process.h.
 #include "capture/decoder/jpeg_xl_decoder.h"
 
 #include <jxl/decode.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <memory>
 #include <new>
 #include <optional>
-#include <type_traits>
+#include <span>
 #include <vector>
+
+#include "capture/decoder/decoder_program.h"
 
 namespace lowlux::capture {
 namespace {
@@ -152,8 +156,7 @@ bool decode_parts(const JpegXlJob& job, const std::vector<Part>& parts, std::vec
   return true;
 }
 
-}  // namespace
-
+/// Decodes the parts of a JpegXlJob, which is the file, with libjxl.
 void decode_with_libjxl(std::span<const std::byte> file, const ReadLimits& limits, DecodeSink& sink) {
   auto header = std::make_unique<DecodedHeader>();
   *header = {};
@@ -182,4 +185,10 @@ void decode_with_libjxl(std::span<const std::byte> file, const ReadLimits& limit
   sink.finish(*header);
 }
 
+}  // namespace
 }  // namespace lowlux::capture
+
+int main(int count, char** arguments) {
+  lowlux::capture::run_decoder(std::span(arguments, static_cast<std::size_t>(count)),
+                               lowlux::capture::decode_with_libjxl);
+}

@@ -1,11 +1,7 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <span>
 #include <type_traits>
-
-#include "capture/decoder/decoder_program.h"
 
 namespace lowlux::capture {
 
@@ -19,9 +15,5 @@ struct JpegXlJob {
   std::uint64_t parts;
 };
 static_assert(std::is_trivially_copyable_v<JpegXlJob>);
-
-/// Decodes the parts of a JpegXlJob, which is the file, with libjxl. It is a DecodeFunction for the program
-/// lowlux-decode-jxl only.
-void decode_with_libjxl(std::span<const std::byte> file, const ReadLimits& limits, DecodeSink& sink);
 
 }  // namespace lowlux::capture

@@ -1,5 +1,4 @@
-#include "capture/decoder/libraw_decoder.h"
-
+// The program lowlux-decode: see decoder_process.h.
 #include <libraw/libraw.h>
 
 #include <algorithm>
@@ -7,6 +6,10 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <span>
+
+#include "capture/decoder/decoder_name.h"
+#include "capture/decoder/decoder_program.h"
 
 namespace lowlux::capture {
 namespace {
@@ -165,8 +168,7 @@ void unpack(LibRaw& libraw, DecodedHeader& h, DecodeSink& sink) {
   h.outcome = written ? DecodeOutcome::decoded : DecodeOutcome::out_of_memory;
 }
 
-}  // namespace
-
+/// Decodes the mosaic of a raw file with LibRaw: unpacking only, without its processing.
 void decode_with_libraw(std::span<const std::byte> file, const ReadLimits& limits, DecodeSink& sink) {
   auto header = std::make_unique<DecodedHeader>();
   DecodedHeader& h = *header;
@@ -192,4 +194,10 @@ void decode_with_libraw(std::span<const std::byte> file, const ReadLimits& limit
   sink.finish(h);
 }
 
+}  // namespace
 }  // namespace lowlux::capture
+
+int main(int count, char** arguments) {
+  lowlux::capture::run_decoder(std::span(arguments, static_cast<std::size_t>(count)),
+                               lowlux::capture::decode_with_libraw);
+}

@@ -13,8 +13,8 @@
 
 #include "capture/dng/dng_colour.h"
 #include "capture/dng/dng_file.h"
+#include "capture/dng/dng_opcodes.h"
 #include "capture/dng/dng_tags.h"
-#include "capture/dng/opcode_reader.h"
 #include "capture/dng/tiff_directory.h"
 
 namespace lowlux::capture {

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "capture/decoder/decoder_name.h"
 #include "capture/decoder/decoder_process.h"
-#include "capture/decoder/libraw_decoder.h"
 #include "capture/dng/dng_colour.h"
 #include "capture/dng/dng_file.h"
 #include "capture/dng/dng_floats.h"

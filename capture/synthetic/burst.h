@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "capture/synthetic/burst_motion.h"
-#include "capture/synthetic/burst_view.h"
 #include "capture/synthetic/exposed_sensor.h"
 #include "capture/synthetic/light_grid.h"
 #include "capture/synthetic/scene.h"
@@ -37,6 +36,8 @@ struct BurstPoint {
   double spread_px = 0;  // standard deviation, the blur of the lens included
   Vector3 signal_e{};    // all of its light in the frame's exposure time, under the filters R, G and B
 };
+
+struct BurstView;
 
 /// A camera that takes a burst of frames of one scene, see BurstOptions. Frame i is a pure function of the options and
 /// of i: any index, in any order, the same for every number of threads. Frames are instants: nothing is blurred by

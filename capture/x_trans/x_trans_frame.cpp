@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "capture/x_trans/x_trans.h"
-#include "capture/x_trans/x_trans_defects.h"
 #include "isp/base/executor.h"
 
 namespace lowlux::capture {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "capture/decoder/libraw_decoder.h"
+#include "capture/decoder/decoder_name.h"
 #include "tests/capture/read_built.h"
 #include "tests/capture/x_trans_colours.h"
 #include "tests/support/dng/float_dng.h"

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "capture/file/file_bytes.h"
-#include "capture/x_trans/x_trans_defects.h"
 #include "isp/codec/png.h"
 #include "tests/support/executors.h"
 

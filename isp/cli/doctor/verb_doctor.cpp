@@ -22,7 +22,7 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/decoder/decoder_process.h"
-#include "capture/decoder/libraw_decoder.h"
+#include "capture/decoder/decoder_name.h"
 #include "isp/cli/capture/capture_list.h"
 #include "isp/cli/config/config_file.h"
 #include "isp/cli/develop/cost_file.h"

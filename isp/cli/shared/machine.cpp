@@ -8,7 +8,7 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
-#include "capture/decoder/libraw_decoder.h"
+#include "capture/decoder/decoder_name.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
 
 namespace lowlux::cli {

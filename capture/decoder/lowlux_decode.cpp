@@ -1,8 +1,0 @@
-// The program lowlux-decode: see decoder_process.h.
-#include "capture/decoder/decoder_program.h"
-#include "capture/decoder/libraw_decoder.h"
-
-int main(int count, char** arguments) {
-  lowlux::capture::run_decoder(std::span(arguments, static_cast<std::size_t>(count)),
-                               lowlux::capture::decode_with_libraw);
-}
