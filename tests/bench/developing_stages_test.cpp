@@ -13,7 +13,6 @@
 #include "isp/base/executor.h"
 #include "isp/bench/accuracy_time.h"
 #include "isp/bench/scenes/develop_scene.h"
-#include "isp/bench/stages/developing_memory.h"
 #include "isp/model/vision/scene_light.h"
 
 namespace lowlux::isp {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <ctime>
 
+#include "isp/bench/accuracy_time.h"
 #include "isp/bench/scenes/simulated_camera.h"
-#include "isp/bench/stages/stage_rows.h"
 #include "isp/raw/measure/masked_black.h"
 
 namespace lowlux::isp {

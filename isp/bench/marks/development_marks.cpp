@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "isp/bench/stages/stage_rows.h"
+#include "isp/bench/accuracy_time.h"
 #include "isp/metrics/picture_marks.h"
 #include "isp/metrics/picture_metrics.h"
 

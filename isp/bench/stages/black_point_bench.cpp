@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "isp/bench/accuracy_time.h"
 #include "isp/bench/scenes/simulated_camera.h"
 #include "isp/bench/stages/simulation_stages.h"
-#include "isp/bench/stages/stage_rows.h"
 #include "isp/metrics/statistics.h"
 #include "isp/model/colour/colour_difference.h"
 #include "isp/raw/measure/masked_black.h"

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <functional>
+#include <optional>
+
 #include "isp/base/result.h"
 #include "isp/bench/bench_stages.h"
 
@@ -35,5 +38,11 @@ Result<BenchOutcome> run_merge_bench(const BenchOptions& options);
 /// Runs the stage `scaling`: time and memory of developing over the size of the frame and the threads; time per file
 /// for a few files. Errors: those of writing and reading these.
 Result<BenchOutcome> run_scaling_bench(const BenchOptions& options);
+
+/// Returns, for the stage `scaling`, the peak memory that work takes in addition to the memory in use before [bytes].
+/// The work runs in a child process, whose largest resident set is read before and after, so that memory left by other
+/// work does not count. The child has the calling thread alone, and ends with the work. Returns nullopt if it could not
+/// be started, or failed.
+std::optional<double> peak_bytes_of(const std::function<bool()>& work);
 
 }  // namespace lowlux::isp

@@ -12,9 +12,9 @@
 #include "calib/picture/picture_noise.h"
 #include "capture/synthetic/synthetic_source.h"
 #include "isp/base/sensor.h"
+#include "isp/bench/accuracy_time.h"
 #include "isp/bench/scenes/simulated_camera.h"
 #include "isp/bench/stages/simulation_stages.h"
-#include "isp/bench/stages/stage_rows.h"
 #include "isp/metrics/statistics.h"
 
 namespace lowlux::isp {

@@ -1,3 +1,9 @@
+#include <fcntl.h>
+#include <malloc.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -20,7 +26,6 @@
 #include "isp/base/executor.h"
 #include "isp/bench/accuracy_time.h"
 #include "isp/bench/scenes/develop_scene.h"
-#include "isp/bench/stages/developing_memory.h"
 #include "isp/bench/stages/developing_stages.h"
 #include "isp/output/dng/dng_writer.h"
 #include "isp/output/picture/image_writer.h"
@@ -52,6 +57,35 @@ struct PlanKind {
 };
 constexpr std::array plan_kinds{PlanKind{"plain", {}}, PlanKind{"draft", Level::draft},
                                 PlanKind{"standard", Level::standard}};
+
+double largest_resident_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024.0 * static_cast<double>(usage.ru_maxrss);
+}
+
+/// Resets the largest resident set to the current one. Returns false if the system does not support it.
+bool forget_largest_resident() {
+  const int file = open("/proc/self/clear_refs", O_WRONLY | O_CLOEXEC);
+  const bool forgotten = file >= 0 && write(file, "5", 1) == 1;
+  if (file >= 0) close(file);
+  return forgotten;
+}
+
+/// Runs the work in the child and sends the added memory to the parent.
+[[noreturn]] void tell(int to, const std::function<bool()>& work) {
+  malloc_trim(0);  // freed memory would otherwise be reused and not counted
+  const bool forgotten = forget_largest_resident();
+  const double before = largest_resident_bytes();
+  const double added = forgotten && work() ? largest_resident_bytes() - before : -1;
+  const bool told = write(to, &added, sizeof added) == static_cast<ssize_t>(sizeof added);
+  _exit(told ? 0 : 1);
+}
+
+/// Returns the physical memory of the machine [bytes].
+double physical_bytes() {
+  return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
 
 DevelopOptions options_of(const PlanKind& plan) {
   DevelopOptions out;
@@ -240,6 +274,20 @@ std::vector<ScalingRow> rows_over_size(const RawFrame& small, const BenchOptions
 }
 
 }  // namespace
+
+std::optional<double> peak_bytes_of(const std::function<bool()>& work) {
+  std::array<int, 2> ends{};
+  if (pipe(ends.data()) != 0) return std::nullopt;
+  const pid_t child = fork();
+  if (child == 0) tell(ends[1], work);
+  close(ends[1]);
+  double added = -1;
+  const bool heard = child > 0 && read(ends[0], &added, sizeof added) == static_cast<ssize_t>(sizeof added);
+  close(ends[0]);
+  if (child > 0) waitpid(child, nullptr, 0);
+  if (!heard || added < 0) return std::nullopt;
+  return added;
+}
 
 Result<BenchOutcome> run_scaling_bench(const BenchOptions& options) {
   PoolExecutor executor(options.threads);

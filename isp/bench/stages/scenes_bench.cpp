@@ -11,13 +11,13 @@
 
 #include "denoise/denoiser.h"
 #include "isp/base/executor.h"
+#include "isp/bench/accuracy_time.h"
 #include "isp/bench/marks/development_marks.h"
 #include "isp/bench/peers/denoise_methods.h"
 #include "isp/bench/peers/nl_means.h"
 #include "isp/bench/scenes/denoise_scene.h"
 #include "isp/bench/scenes/generated_scenes.h"
 #include "isp/bench/stages/developing_stages.h"
-#include "isp/bench/stages/stage_rows.h"
 
 namespace lowlux::isp {
 namespace {

@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 
 #include "capture/synthetic/synthetic_source.h"
+#include "isp/bench/accuracy_time.h"
 #include "isp/bench/scenes/simulated_camera.h"
 #include "isp/bench/stages/simulation_stages.h"
-#include "isp/bench/stages/stage_rows.h"
 #include "isp/metrics/picture_comparison.h"
 #include "isp/model/colour/colour_difference.h"
 

@@ -9,10 +9,10 @@
 #include "capture/synthetic/block_levels.h"
 #include "capture/synthetic/sensor_sim.h"
 #include "capture/synthetic/synthetic_source.h"
+#include "isp/bench/accuracy_time.h"
 #include "isp/bench/peers/nl_means.h"
 #include "isp/bench/scenes/simulated_camera.h"
 #include "isp/bench/stages/simulation_stages.h"
-#include "isp/bench/stages/stage_rows.h"
 #include "isp/model/colour/colour_difference.h"
 
 namespace lowlux::isp {

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 
 #include "denoise/denoiser.h"
-#include "isp/bench/stages/method_rows.h"
+#include "isp/bench/stages/methods_bench.h"
 #include "isp/cli/shared/module.h"
 
 namespace lowlux::cli {
