@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 
 #include "isp/reproduce/reproduce.h"
-#include "isp/reproduce/retargeting_displays.h"
+#include "isp/reproduce/retargeting_scores.h"
 
 namespace lowlux::isp {
 namespace {

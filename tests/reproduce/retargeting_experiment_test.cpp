@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "isp/reproduce/reproduce.h"
-#include "isp/reproduce/retargeting_displays.h"
-#include "isp/reproduce/retargeting_pictures.h"
+#include "isp/reproduce/retargeting_scores.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux::isp {

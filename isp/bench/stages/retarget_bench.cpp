@@ -18,8 +18,7 @@
 #include "isp/render/retarget/retarget.h"
 #include "isp/render/retarget/retarget_rows.h"
 #include "isp/render/retarget/retarget_table.h"
-#include "isp/reproduce/retargeting_displays.h"
-#include "isp/reproduce/retargeting_pictures.h"
+#include "isp/reproduce/retargeting_scores.h"
 
 namespace lowlux::isp {
 namespace {

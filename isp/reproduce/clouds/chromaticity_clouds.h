@@ -34,10 +34,6 @@ std::vector<Finding> blue_and_red(const std::vector<Colour>& chips, const Colour
 /// Plots the ellipses of colours at the dimmest level, and MacAdam's.
 Plot chip_plot(const std::string& id, const std::string& title, const std::vector<Colour>& chips);
 
-/// Samples the chips by cones (Eq. 3.9, 3.10) in place of the CIE 1931 functions, and compares the ellipses.
-/// @param chips  as the CIE 1931 observer sees them by the same draws
-Result<Outcome> cone_clouds(const std::vector<Colour>& chips, const CloudDraws& draws);
-
 /// Returns the reflectances of the ColorChecker under D65, each followed by the smoothest light of the same colour
 /// (isp/model/spectrum/spectral_lift.h), without clouds. Errors: a reflectance whose colour has no such light.
 Result<std::vector<Colour>> metameric_halves();
