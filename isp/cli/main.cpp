@@ -15,9 +15,7 @@
 
 #include <fmt/format.h>
 
-#include "isp/cli/help/completion.h"
-#include "isp/cli/help/man_page.h"
-#include "isp/cli/help/suggestion.h"
+#include "isp/cli/help/help_files.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/interruption.h"
 #include "isp/cli/shared/lines.h"

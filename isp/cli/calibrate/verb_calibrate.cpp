@@ -14,7 +14,6 @@
 #include "isp/cli/calibrate/calibrate_colour.h"
 #include "isp/cli/calibrate/calibration.h"
 #include "isp/cli/help/help_text.h"
-#include "isp/cli/help/suggestion.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/option_values.h"

@@ -12,8 +12,8 @@
 #include <CLI/CLI.hpp>
 
 #include "capture/file/file_bytes.h"
-#include "isp/cli/help/suggestion.h"
 #include "isp/cli/help/verb_help.h"
+#include "isp/cli/shared/lines.h"
 
 namespace lowlux::cli {
 namespace {

@@ -2,26 +2,31 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "capture/file/file_bytes.h"
 #include "isp/cli/dataset/dataset_args.h"
 #include "isp/cli/dataset/dataset_check.h"
 #include "isp/cli/dataset/dataset_sample.h"
 #include "isp/cli/dataset/dataset_spec.h"
-#include "isp/cli/dataset/manifest.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/interruption.h"
 #include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/progress.h"
 #include "isp/cli/verbs.h"
+#include "isp/output/atomic_file.h"
 #include "isp/output/private_folder.h"
 
 namespace lowlux::cli {
@@ -29,6 +34,87 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
+/// Returns the number of samples of a shard, and the index of one of them, 0 being the first.
+std::uint64_t samples_in(const DatasetSpec& spec, const Shard& shard) {
+  return spec.count < shard.number ? 0 : (spec.count - shard.number) / shard.count + 1;
+}
+
+std::uint64_t index_in(const DatasetSpec& spec, const Shard& shard, std::uint64_t sample) {
+  return spec.first_index + (shard.number - 1) + sample * shard.count;
+}
+
+Json head_of(const DatasetSpec& spec) { return {{"lowlux", version_number()}, {"spec_sha256", spec.sha256}}; }
+
+/// Writes dataset.json, which states the spec, the hashes of its files and the version, or checks one that exists. It
+/// does not depend on the shard and the count, so that more samples can be added later. Errors: the folder holds
+/// samples of another spec or version, and `force` is not given; those of AtomicFile.
+Result<void> claim_folder(const DatasetSpec& spec, const std::string& folder, bool force) {
+  constexpr std::uint64_t max_bytes = 256 << 20;
+  const std::string file = (fs::path(folder) / "dataset.json").string();
+  Json json = head_of(spec);
+  json.update(Json::parse(spec.identity));
+  const std::string text = json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  const auto same = [&] {
+    const auto old = capture::read_file_bytes(file, max_bytes);
+    return old && std::string_view(reinterpret_cast<const char*>(old->data()), old->size()) == text;
+  };
+  if (same()) return {};
+  auto written = isp::write_text(file, text, force ? isp::Overwrite::yes : isp::Overwrite::no);
+  // Another shard may have written the file meanwhile.
+  if (written || written.error().code != ErrorCode::exists || same()) return written ? written : Result<void>{};
+  return fail(ErrorCode::exists,
+              "states another spec or version of lowlux: choose another folder, or replace its samples with --force",
+              file);
+}
+
+/// Writes manifest-I-of-N.json: the files of each sample of a shard with their sizes and SHA-256. Samples go to the
+/// disk as they are added, so that memory does not grow with their number.
+class Manifest {
+ public:
+  /// Errors: those of AtomicFile.
+  static Result<Manifest> create(const DatasetSpec& spec, const Shard& shard, const std::string& folder);
+  Result<void> add(std::uint64_t index, const DatasetSample& sample);
+  /// Gives the file its name. Call it once, after all samples.
+  Result<void> commit();
+
+ private:
+  Manifest(isp::AtomicFile file, std::string name) : file_(std::move(file)), name_(std::move(name)) {}
+  Result<void> write(std::string_view text);
+
+  isp::AtomicFile file_;
+  std::string name_;
+  bool first_ = true;
+};
+
+Result<Manifest> Manifest::create(const DatasetSpec& spec, const Shard& shard, const std::string& folder) {
+  std::string name = (fs::path(folder) / fmt::format("manifest-{}-of-{}.json", shard.number, shard.count)).string();
+  auto file = isp::AtomicFile::create(name, isp::Overwrite::yes);
+  if (!file) return tl::make_unexpected(file.error());
+  Manifest out(*std::move(file), std::move(name));
+  Json head = head_of(spec);
+  head["shard"] = fmt::format("{}/{}", shard.number, shard.count);
+  head["first_index"] = spec.first_index;
+  head["count"] = spec.count;
+  std::string text = head.dump();
+  text.pop_back();
+  if (const auto done = out.write(text + ",\n\"samples\": ["); !done) return tl::make_unexpected(done.error());
+  return out;
+}
+
+Result<void> Manifest::add(std::uint64_t index, const DatasetSample& sample) {
+  const char* const separator = std::exchange(first_, false) ? "\n" : ",\n";
+  return write(separator + Json{{"index", index}, {"files", Json::parse(sample.files)}}.dump());
+}
+
+Result<void> Manifest::commit() {
+  return write("\n]}\n").and_then([&] { return file_.commit(); });
+}
+
+Result<void> Manifest::write(std::string_view text) {
+  if (std::fwrite(text.data(), 1, text.size(), file_.file()) == text.size()) return {};
+  return fail(ErrorCode::unwritable, "the file cannot be written completely; is the disk full?", name_);
+}
 
 /// Holds size and time of one sample.
 struct SampleCost {

@@ -21,12 +21,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "capture/decoder/decoder_process.h"
 #include "capture/decoder/decoder_name.h"
+#include "capture/decoder/decoder_process.h"
 #include "isp/cli/capture/capture_list.h"
 #include "isp/cli/config/config_file.h"
 #include "isp/cli/develop/cost_file.h"
-#include "isp/cli/help/suggestion.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/machine.h"

@@ -4,8 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "isp/cli/help/completion.h"
-#include "isp/cli/help/man_page.h"
+#include "isp/cli/help/help_files.h"
 
 namespace lowlux::cli {
 namespace {

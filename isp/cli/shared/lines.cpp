@@ -6,6 +6,9 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "isp/base/text.h"
 
 namespace lowlux::cli {
 namespace {
@@ -64,6 +67,11 @@ std::string one_line(std::string text) {
     if (c == 0xc2 && next >= 0x80 && next < 0xa0) text[i] = text[i + 1] = ' ';  // U+0080 to U+009F in UTF-8
   }
   return text;
+}
+
+std::string suggestion(std::string_view wanted, std::span<const std::string_view> known) {
+  const auto near = near_matches(wanted, known);
+  return near.empty() ? std::string() : fmt::format(" (did you mean {}?)", fmt::join(near, " or "));
 }
 
 }  // namespace lowlux::cli

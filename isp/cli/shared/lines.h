@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -11,7 +12,6 @@
 
 /// These functions are the only access of the command to stdout and stderr. They do not throw: text that a stream did
 /// not accept is lost, which std::ferror() reports. main() turns lost output into an exit code.
-
 namespace lowlux::cli {
 
 /// Returns the text with every control character replaced by a blank, so that no file name can break a line.
@@ -70,5 +70,8 @@ EstimateCells cells_of(const Estimate& estimate);
 
 /// Returns the value and its standard error in one text: "2047.30 +- 0.24".
 std::string text_of(const Estimate& estimate);
+
+/// Returns " (did you mean --exposure?)" for a name that is similar to a known one, empty if none is.
+std::string suggestion(std::string_view wanted, std::span<const std::string_view> known);
 
 }  // namespace lowlux::cli

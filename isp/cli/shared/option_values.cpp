@@ -18,7 +18,6 @@
 #include "isp/cli/config/config_file.h"
 #include "isp/cli/help/help_page.h"
 #include "isp/cli/help/help_text.h"
-#include "isp/cli/help/suggestion.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/report.h"
