@@ -97,6 +97,7 @@ TEST(FloatFrames, AreDevelopedLikeCodesOfTheSameValues) {
         DevelopOptions options = linear();
         options.half = half;
         options.samples = samples;
+        if (samples == SampleType::f32) options.demosaic = DemosaicMethod::malvar;  // residuals amplify rounding: below
         if (samples != SampleType::f32) {
           options.space = OutputSpace::srgb;
           options.tone = ToneCurve::standard;
@@ -338,7 +339,8 @@ TEST(WideRange, DevelopingKeepsEachValueOver24Ev) {
   const auto plan = plan_develop(frame, options, one_thread);
   double worst = 0;
   for (int c = 0; c < 3; ++c) {
-    const double gain = plan->rendering.white_gain[static_cast<std::size_t>(c)];
+    const double gain =
+        plan->rendering.white_gain[static_cast<std::size_t>(c)] * plan->rendering.transform.matrix[4 * c];
     const Plane<float>& plane = std::get<SceneLinear>(picture).plane[static_cast<std::size_t>(c)];
     for (int y = 0; y < side / 2; ++y) {
       for (int x = 0; x < side / 2; ++x) {

@@ -85,7 +85,9 @@ SceneLinear rendered(const Case& of, const DevelopPlan& plan, const TileLimits& 
 /// Electrons for a sample of 1 of each colour. At a site of its own colour, demosaicing changes nothing.
 std::array<double, 3> unit_e(const DevelopPlan& plan) {
   std::array<double, 3> out{};
-  for (std::size_t c = 0; c < 3; ++c) out[c] = test::night_full_e() / plan.rendering.white_gain[c];
+  for (std::size_t c = 0; c < 3; ++c) {
+    out[c] = test::night_full_e() / (plan.rendering.white_gain[c] * plan.rendering.transform.matrix[4 * c]);
+  }
   return out;
 }
 

@@ -183,7 +183,8 @@ Difference difference(const Picture& tiled, const Picture& whole, const DevelopP
   Difference out;
   double sum = 0;
   for (int c = 0; c < 3; ++c) {
-    const double electrons = (*plan.levels.electrons_at_white)[0] / plan.rendering.white_gain[c];
+    const double electrons =
+        (*plan.levels.electrons_at_white)[0] / (plan.rendering.white_gain[c] * plan.rendering.transform.matrix[4 * c]);
     for (std::size_t i = 0; i < a.plane[c].size(); ++i) {
       const double light_e = electrons * static_cast<double>(b.plane[c].data()[i]);
       const double noise_e = std::sqrt(std::max(light_e, 0.0) + 1.5 * 1.5);

@@ -200,7 +200,7 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thum
   if (!is_mosaic(frame.raw)) {
     if (has_noise) set_pixel_noise(frame, thumbnail, o, levels, rendering, facts, executor);
   } else if (has_noise || (has_dark && levels.electrons_at_white)) {
-    model = noise_model(frame, levels, rendering.white_gain, o.space);
+    model = noise_model(frame, levels, rendering.white_gain);
     facts.blocks = seen_blocks(frame, o, levels, rendering, model->noise, thumbnail, executor);
     facts.has_noise = has_noise && !facts.blocks.empty();
   }

@@ -87,6 +87,17 @@ LiveNoise with_masked_charge(LiveNoise noise, const BlackPoint& black) {
   return noise;
 }
 
+/// Returns Thumbnail::light_range: 1 where the pedestal is not known apart from the dark charge.
+double light_range_of(const RawDn& raw, const BlackPoint& black, const std::optional<LiveNoise>& noise) {
+  if (!noise || !noise->pedestal_dn || black.source != BlackPoint::Source::masked_pixels) return 1;
+  double sum = 0;
+  for (int site = 0; site < 4; ++site) {
+    const double range_dn = white_at(raw, site) - black.pedestal_dn[site];
+    sum += range_dn / std::max(white_at(raw, site) - (*noise->pedestal_dn)[site], range_dn) / 4;
+  }
+  return sum;
+}
+
 /// Returns the camera RGB of daylight; equal channels where no calibration states it.
 Vector3 daylight_of(const CameraColour& colour) {
   if (colour.calibrations.empty()) return {1, 1, 1};
@@ -265,8 +276,8 @@ Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame)
     out.exposure_ev = smooth_exposure(automatic.ev);
     out.exposure_rule = name_of(automatic.rule);
   }
-  Result<std::optional<LookPlan>> look =
-      plan_look(frame, {blocks_, noise_std, out.white, out.exposure_ev, *balanced}, plan_.options);
+  Result<std::optional<LookPlan>> look = plan_look(
+      frame, {blocks_, noise_std, out.white, out.exposure_ev, *balanced, 0, thumbnail_.light_range}, plan_.options);
   if (!look) return tl::make_unexpected(std::move(look.error()));
   out.look = *std::move(look);
   if (out.look) out.exposure_ev += out.look->dimming_ev;
@@ -287,7 +298,7 @@ void LivePlanner::choose_level(const LiveDenoise& wanted, const RawFrame& frame)
   out.snr.reset();
   const bool can = plan_.levels.electrons_at_white && frame.raw.layout == SensorLayout::bayer;
   if (can) {
-    const NoiseModel model = noise_model(frame, plan_.levels, plan_.rendering.white_gain, plan_.options.space);
+    const NoiseModel model = noise_model(frame, plan_.levels, plan_.rendering.white_gain);
     out.source = model.source;
     out.noise = model.noise;
     out.options.white_gain = model.white_gain;
@@ -347,6 +358,7 @@ Result<void> LivePlanner::plan(const LiveFacts& facts, FrameMeter& meter, RawFra
   if (Result<void> black = set_black(facts, meter, frame); !black) return black;
   set_noise(facts, meter, frame);
   if (needs_light(facts)) meter.thumbnail().make(frame, plan_.levels.black, thumbnail_);
+  thumbnail_.light_range = light_range_of(frame.raw, plan_.levels.black, facts.noise);
   if (Result<void> rendering = set_rendering(facts, frame); !rendering) return rendering;
   choose_level(facts.denoise, frame);
   set_temporal(facts, frame);

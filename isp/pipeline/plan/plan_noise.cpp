@@ -49,12 +49,9 @@ denoise::RawNoise noise_of(const RawFrame& frame, const RawLevels& levels) {
 }
 
 /// Returns the gains that make a neutral equal in R, G and B [e-]; that of G is 1.
-std::array<double, 3> balance_of(const RawFrame& frame, const RawLevels& levels, const std::array<float, 3>& white_gain,
-                                 OutputSpace space) {
+std::array<double, 3> balance_of(const RawFrame& frame, const RawLevels& levels,
+                                 const std::array<float, 3>& white_gain) {
   std::array<double, 3> gain{white_gain[0], white_gain[1], white_gain[2]};
-  if (space == OutputSpace::camera && frame.colour.as_shot_neutral) {
-    for (int c = 0; c < 3; ++c) gain[c] = 1 / (*frame.colour.as_shot_neutral)[c];
-  }
   const PerSite<double> light_e = light_at_white_e(levels);
   for (int site = 0; site < 4; ++site) {
     const int colour = colour_of(frame.raw, site);
@@ -155,9 +152,8 @@ std::optional<denoise::Level> level_for(double snr) {
   return snr >= 3 ? denoise::Level::standard : denoise::Level::high;
 }
 
-NoiseModel noise_model(const RawFrame& frame, const RawLevels& levels, const std::array<float, 3>& white_gain,
-                       OutputSpace space) {
-  return {frame.noise->source, noise_of(frame, levels), balance_of(frame, levels, white_gain, space)};
+NoiseModel noise_model(const RawFrame& frame, const RawLevels& levels, const std::array<float, 3>& white_gain) {
+  return {frame.noise->source, noise_of(frame, levels), balance_of(frame, levels, white_gain)};
 }
 
 double middle_snr(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
@@ -175,7 +171,7 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   }
   if (is_denoised_before(frame, choice)) return left_alone(frame, "the raw was denoised before");
   if (!is_mosaic(frame.raw)) return plan_pixel_noise(frame, thumbnail, levels, request, executor);
-  const NoiseModel model = noise_model(frame, levels, request.white_gain, request.space);
+  const NoiseModel model = noise_model(frame, levels, request.white_gain);
   NoiseReduction out;
   out.source = model.source;
   out.noise = model.noise;

@@ -44,8 +44,7 @@ struct NoiseModel {
 };
 
 /// Returns the noise model of a frame. Precondition: frame.noise, levels.electrons_at_white.
-NoiseModel noise_model(const RawFrame& frame, const RawLevels& levels, const std::array<float, 3>& white_gain,
-                       OutputSpace space);
+NoiseModel noise_model(const RawFrame& frame, const RawLevels& levels, const std::array<float, 3>& white_gain);
 
 /// Returns the median over all blocks of the signal-to-noise ratio of a mean pixel, with the noise of each block.
 /// @param snr  memory; grows to one value for each block

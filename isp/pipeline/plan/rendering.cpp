@@ -219,6 +219,18 @@ RgbTransform transform_of(const Matrix3& balanced, const Rendering& rendering, c
   return out;
 }
 
+/// Balances camera RGB by the white of the shot for as long as missing colours are interpolated, which relies on greys
+/// of equal values: the matrix takes the gains back.
+void balance_interpolation(const RawFrame& frame, Rendering& out) {
+  const std::optional<Vector3>& neutral = frame.colour.as_shot_neutral;
+  if (frame.raw.layout != SensorLayout::bayer || !neutral) return;
+  for (const double share : *neutral) {
+    if (!(share > 1e-3 && share < 1e3)) return;
+  }
+  out.white_gain = white_gain_of(*neutral);
+  for (int i = 0; i < 9; ++i) out.transform.matrix[i] /= out.white_gain[i % 3];
+}
+
 ToneTable tone_of(double limit, const DevelopOptions& options) {
   if (options.samples == SampleType::f32) return {};
   return make_tone_table(options.tone, options.space, limit, options.tone_shape);
@@ -261,6 +273,7 @@ Result<Rendering> decide_rendering(const RawFrame& frame, const Thumbnail& light
   out.profile = decide_profile(frame, options, out, colours, has_curve);
   const Matrix3 adapted = out.look ? out.look->adaptation * *balanced : *balanced;
   out.transform = transform_of(out.profile ? adapted : colours * adapted, out, options);
+  if (options.space == OutputSpace::camera) balance_interpolation(frame, out);
   out.tone = tone_of(out.limit, options);
   if (!out.look || out.look->kind != Look::model) return out;
   Result<ModelTable> model =

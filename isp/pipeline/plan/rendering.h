@@ -27,6 +27,8 @@ struct Rendering {
   Vector3 neutral{1, 1, 1};         // camera RGB of white, largest 1
   std::optional<WhitePoint> white;  // absent without a colour calibration
   std::string_view white_balance_rule;
+  /// Applied before missing colours are interpolated. In camera RGB it is that of the shot, and `transform` takes it
+  /// back.
   std::array<float, 3> white_gain{1, 1, 1};
   double exposure_ev = 0;
   std::string_view exposure_rule;

@@ -57,6 +57,8 @@ struct Burst {
   double mean_e = 20;
   double read_noise_e = 2;
   bool find_defects = false;
+  /// Camera RGB of a white of the scene.
+  Vector3 neutral{0.5, 1, 0.625};
   /// Changes a frame after its exposure.
   std::function<void(RawFrame&, int)> disturb = {};
   /// Exposure of a frame relative to the first.
@@ -107,6 +109,7 @@ struct Burst {
 
   RawFrame frame(int index) const {
     RawFrame out = frame_as_exposed(index);
+    out.colour.as_shot_neutral = neutral;
     if (disturb) disturb(out, index);
     return out;
   }
