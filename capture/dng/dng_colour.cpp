@@ -188,9 +188,10 @@ Result<std::optional<NoiseProfile>> read_noise(const DngFile& dng, const TiffDir
     noise.scale[i] = pairs[at];
     noise.offset[i] = pairs[at + 1];
   }
-  // From 0, none, to 1, as much as there should be; 0/0 where it is not known, which other values count as too.
+  // From 0, none, to 1, as much as there should be; 0/0 where it is not known, which other values count as too. With
+  // less than a half there is noise left to be reduced.
   const auto applied = directory.numbers(tag::noise_reduction_applied, 1, 1);
-  noise.reduced = applied && *applied && (**applied)[0] > 0 && (**applied)[0] <= 1;
+  noise.reduced = applied && *applied && (**applied)[0] >= 0.5 && (**applied)[0] <= 1;
   return noise;
 }
 

@@ -190,6 +190,21 @@ TEST(NoiseReduction, WhatIsExpectedOfAModelIsNotWarnedOf) {
   }
 }
 
+// A second time loses detail; who asks for a level gets it.
+TEST(NoiseReduction, ARawThatWasDenoisedIsDenoisedAgainOnRequestOnly) {
+  for (const auto source : {NoiseProfile::Source::file, NoiseProfile::Source::picture}) {
+    RawFrame frame = test::night_frame({}, grey(20), 128, 96);
+    frame.noise->source = source;
+    EXPECT_TRUE(planned(frame, {.mode = Mode::automatic}).noise_reduction.level);
+    frame.noise->reduced = true;
+    const auto plan = planned(frame, {.mode = Mode::automatic});
+    EXPECT_FALSE(plan.noise_reduction.level);
+    EXPECT_EQ(plan.noise_reduction.reason, "the raw was denoised before");
+    EXPECT_TRUE(planned(frame, {.mode = Mode::automatic, .always = true}).noise_reduction.level);
+    EXPECT_EQ(planned(frame, {.mode = Mode::level, .level = Level::standard}).noise_reduction.level, Level::standard);
+  }
+}
+
 TEST(NoiseReduction, APedestalThatIsTooHighIsWarnedOf) {
   const RawFrame frame = test::night_frame({}, grey(1), 256, 256);
   DevelopOptions options = linear({.mode = Mode::level});

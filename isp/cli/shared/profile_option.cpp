@@ -34,7 +34,8 @@ void use_colours(const CameraProfile& profile, RawFrame& frame, isp::LookChoice&
 /// Sets the noise of the profile, relative to the black point that is going to be subtracted.
 void set_noise(const calib::ProfileAtFrame& found, const ProfileChoice& choice, const isp::BlackRequest& request,
                RawFrame& frame) {
-  if (!found.noise) return;
+  const bool is_clean_raw = frame.noise && frame.noise->reduced;  // its noise is not that of the sensor
+  if (!found.noise || is_clean_raw) return;
   frame.noise = found.noise;
   if (!choice.with_darks) {
     const Result<BlackPoint> black = isp::choose_black_by_gain(frame, request);

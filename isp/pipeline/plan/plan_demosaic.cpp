@@ -33,8 +33,7 @@ DemosaicPlan chosen(const RawFrame& frame, const NoiseReduction& noise, const De
   }
   if (request.max_method < DemosaicMethod::residual)
     return {{request.max_method}, "best method that fits into the time"};
-  if (request.max_method > DemosaicMethod::residual && !came_reduced(frame) && request.signal_e &&
-      *request.signal_e < max_median_e) {
+  if (request.max_method > DemosaicMethod::residual && request.signal_e && *request.signal_e < max_median_e) {
     return {{DemosaicMethod::residual_median}, "little light: medians remove false colour"};
   }
   return {{DemosaicMethod::residual}, "preserves most detail"};
