@@ -146,12 +146,14 @@ Plane<float> window_least(int width, int height, int reach, Executor& executor, 
 Plane<float> far_from_saturation(const CaptureSharpening& how, const RgbView<float>& rgb, int reach,
                                  Executor& executor) {
   const int width = rgb[0].width, height = rgb[0].height;
-  const Plane<float> unsaturated = window_least(width, height, reach + ramp_px, executor, [&](int x, int y) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      if (rgb[c].row(y)[x] >= saturated_from * how.saturation[c]) return 0.0f;
-    }
-    return 1.0f;
+  Plane<float> mask(width, height);
+  for_each_pixel(width, height, executor, [&](int x, int y) {
+    bool saturated = false;
+    for (std::size_t c = 0; c < 3; ++c) saturated = saturated || rgb[c].row(y)[x] >= saturated_from * how.saturation[c];
+    mask.at(x, y) = saturated ? 0.0f : 1.0f;
   });
+  const Plane<float> unsaturated =
+      window_least(width, height, reach + ramp_px, executor, [&](int x, int y) { return mask.at(x, y); });
   return window_mean(width, height, ramp_px, executor, [&](int x, int y) { return unsaturated.at(x, y); });
 }
 
@@ -197,16 +199,18 @@ void sharpen_capture(const CaptureSharpening& how, PlaneView<const float> varian
   const int reach = (terms + 1) * (static_cast<int>(half.size()) - 1);
   const Plane<float> allowed = far_from_saturation(how, rgb, reach, executor);
   const auto noise_gain = static_cast<float>(detail_noise_gain(how.blur_px));
-  for (std::size_t c = 0; c < 3; ++c) {
-    const Plane<float> limit = lower_limit(rgb[c], executor);
-    for_each_pixel(width, height, executor, [&](int x, int y) {
-      const float noise = over_noise * noise_gain * variance.row(y / cell_px)[x / cell_px];
-      if (!(allowed.at(x, y) > 0 && signal.at(x, y) > noise)) return;
-      const float gain = allowed.at(x, y) * (1 - noise / signal.at(x, y));
-      float& value = rgb[c].row(y)[x];
-      value = std::max(value + gain * detail.at(x, y), std::min(value, limit.at(x, y)));
-    });
-  }
+  const std::array<Plane<float>, 3> limit{lower_limit(rgb[0], executor), lower_limit(rgb[1], executor),
+                                          lower_limit(rgb[2], executor)};
+  for_each_pixel(width, height, executor, [&](int x, int y) {
+    const float noise = over_noise * noise_gain * variance.row(y / cell_px)[x / cell_px];
+    if (!(allowed.at(x, y) > 0 && signal.at(x, y) > noise)) return;
+    float change = allowed.at(x, y) * (1 - noise / signal.at(x, y)) * detail.at(x, y);
+    if (change < 0) {
+      for (std::size_t c = 0; c < 3; ++c)
+        change = std::max(change, std::min(limit[c].at(x, y) - rgb[c].row(y)[x], 0.0f));
+    }
+    for (std::size_t c = 0; c < 3; ++c) rgb[c].row(y)[x] += change;
+  });
 }
 
 }  // namespace lowlux::isp

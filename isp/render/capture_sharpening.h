@@ -27,9 +27,9 @@ struct CaptureSharpening {
 /// has 1.03, 1.04, 0.83, 0.51, 0.14 of it. Each pixel gets g D in all channels, so that colour differences stay. g =
 /// max(0, 1 - 3 N / S) is a Wiener gain: S is the mean of D^2 over 7 x 7 pixels, N what noise of the stated variance
 /// makes of it if it is independent from pixel to pixel. Noise reduction leaves coarser noise, of which D has less: g
-/// is then too small rather than too large. No channel is lowered below three quarters of its least value within 2
-/// pixels, where this is positive, else below that value: there are no dark lines beside lamps and edges. The result
-/// does not depend on the number of threads.
+/// is then too small rather than too large. A negative g D is limited so that no channel is lowered below three
+/// quarters of its least value within 2 pixels, where this is positive, else below that value: there are no dark lines
+/// beside lamps and edges. The result does not depend on the number of threads.
 /// @param variance  of the noise of Y, one value for each cell of 4 x 4 pixels: ceil(height / 4) x ceil(width / 4)
 void sharpen_capture(const CaptureSharpening& how, PlaneView<const float> variance, const RgbView<float>& rgb,
                      Executor& executor);
