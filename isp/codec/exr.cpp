@@ -89,17 +89,18 @@ void set_text(Imf::Header& header, const char* name, const std::string& text) {
   if (!text.empty()) header.insert(name, Imf::StringAttribute(text));
 }
 
-/// Returns the sum of the unsigned fractions of a tag, each divided by 60 once more: degrees, minutes and seconds.
-std::optional<double> degrees_of(const std::vector<SourceTag>& tags, std::uint16_t id) {
+/// Returns the sum of the unsigned fractions of a tag, each divided by 60 once more: degrees, minutes and seconds, of
+/// which the last ones may be unknown; nullopt if it is above `largest`.
+std::optional<double> degrees_of(const std::vector<SourceTag>& tags, std::uint16_t id, double largest) {
   const SourceTag* tag = find_tag(tags, id);
-  if (tag == nullptr || tag->type != 5 || tag->values.size() % 8 != 0) return std::nullopt;
+  if (tag == nullptr || tag->type != 5 || tag->values.size() % 8 != 0 || tag->values.empty()) return std::nullopt;
   double sum = 0, unit = 1;
-  for (std::size_t at = 0; at < tag->values.size(); at += 8, unit /= 60) {
+  for (std::size_t at = 0; at < std::min<std::size_t>(tag->values.size(), 24); at += 8, unit /= 60) {
     std::array<std::uint32_t, 2> terms{};  // little-endian, as this machine is
     std::memcpy(terms.data(), tag->values.data() + at, 8);
-    sum += unit * terms[0] / terms[1];
+    if (at == 0 || terms[1] != 0) sum += unit * terms[0] / terms[1];
   }
-  return std::isfinite(sum) ? std::optional(sum) : std::nullopt;
+  return sum <= largest ? std::optional(sum) : std::nullopt;
 }
 
 void add_source_tags(const SourceTags& tags, Imf::Header& header) {
@@ -110,7 +111,8 @@ void add_source_tags(const SourceTags& tags, Imf::Header& header) {
   set_text(header, "lensMake", text_of(tags.exif, 42035));
   set_text(header, "lensModel", text_of(tags.exif, 42036));
   set_text(header, "lensSerialNumber", text_of(tags.exif, 42037));
-  const auto north = degrees_of(tags.gps, 2), east = degrees_of(tags.gps, 4), height_m = degrees_of(tags.gps, 6);
+  const auto north = degrees_of(tags.gps, 2, 90), east = degrees_of(tags.gps, 4, 180);
+  const auto height_m = degrees_of(tags.gps, 6, 1e6);
   if (north) Imf::addLatitude(header, static_cast<float>(text_of(tags.gps, 1) == "S" ? -*north : *north));
   if (east) Imf::addLongitude(header, static_cast<float>(text_of(tags.gps, 3) == "W" ? -*east : *east));
   const SourceTag* below = find_tag(tags.gps, 5);

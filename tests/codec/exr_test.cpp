@@ -162,10 +162,12 @@ TEST(Exr, CaptionAuthorLensAndPlaceBecomeAttributes) {
   EXPECT_FLOAT_EQ(number(file, "nominalFocalLength"), 35);
   // Damaged tags are left out: a divisor of 0, and a text of another type.
   tags.gps[1] = fractions(2, {33, 0, 51, 1, 30, 1});
+  tags.gps[3] = fractions(4, {70, 1, 30, 1, 0, 0});  // unknown seconds
   tags.main[1].type = 7;
   metadata.source_tags = std::make_shared<const SourceTags>(tags);
   const std::string damaged = header();
   EXPECT_EQ(attribute(damaged, "latitude", "float"), "absent");
+  EXPECT_FLOAT_EQ(number(damaged, "longitude"), -70.5F);
   EXPECT_EQ(attribute(damaged, "owner", "string"), "absent");
   EXPECT_EQ(attribute(damaged, "comments", "string"), "A bridge");
 }
