@@ -13,6 +13,7 @@ namespace lowlux::calib {
 namespace {
 
 constexpr double min_activation_ev = 0.1, max_activation_ev = 2;
+constexpr double explained = 4;  // chi-square of one degree of freedom
 
 /// The law with its amplitude at the highest temperature: F + amplitude * shape.
 struct Fit {
@@ -112,6 +113,28 @@ int temperatures_of(std::span<const RateAtTemperature> rates) {
     last = i;
   }
   return count;
+}
+
+/// Returns the chi-square of the best law that doubles with a fixed number of degrees, to first order in the errors.
+double misfit_of_doubling(std::span<const RateAtTemperature> rates) {
+  double weight = 0, mean_t = 0, mean_log = 0, tt = 0, tl = 0, ll = 0;
+  for (const RateAtTemperature& r : rates) {
+    if (!(r.e_per_s.value > 0)) return std::numeric_limits<double>::infinity();
+    const double w = std::pow(r.e_per_s.value / r.e_per_s.standard_error, 2);
+    weight += w;
+    mean_t += w * r.temperature_c;
+    mean_log += w * std::log(r.e_per_s.value);
+  }
+  mean_t /= weight;
+  mean_log /= weight;
+  for (const RateAtTemperature& r : rates) {
+    const double w = std::pow(r.e_per_s.value / r.e_per_s.standard_error, 2);
+    const double t = r.temperature_c - mean_t, l = std::log(r.e_per_s.value) - mean_log;
+    tt += w * t * t;
+    tl += w * t * l;
+    ll += w * l * l;
+  }
+  return ll - tl * tl / tt;
 }
 
 /// Mean of a plane and the standard error that its scatter gives it.
@@ -220,8 +243,15 @@ std::optional<DarkLaw> fit_dark_law(std::span<const RateAtTemperature> rates) {
   const Fit best = fit.at(activation_ev);
   const bool inside = activation_ev > min_activation_ev + 1e-6 && activation_ev < max_activation_ev - 1e-6;
   if (!inside || !(best.amplitude > 0)) return std::nullopt;
+  const double doubling = misfit_of_doubling(rates), degrees = static_cast<double>(rates.size()) - 3;
+  if (degrees > 0 ? doubling <= best.misfit : doubling < explained) return std::nullopt;
   auto law = fit.law(activation_ev, best);
-  if (!law || !(law->activation_ev.standard_error < activation_ev / 2)) return std::nullopt;
+  if (!law) return std::nullopt;
+  if (degrees > 0 && best.misfit / degrees > 1 + 5 * std::sqrt(2 / degrees)) {
+    for (Estimate* e : {&law->activation_ev, &law->floor_e_per_s})
+      e->standard_error *= std::sqrt(best.misfit / degrees);
+  }
+  if (!(law->activation_ev.standard_error < activation_ev / 2)) return std::nullopt;
   return law;
 }
 

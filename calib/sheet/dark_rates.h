@@ -24,8 +24,10 @@ struct DarkLaw {
 };
 
 /// Fits the law by weighted least squares to the rates at three or more temperatures that differ by more than a degree.
-/// Standard errors are those that the rates' errors give, to first order. Returns nullopt if there are fewer
-/// temperatures, or if the rates do not determine an energy of 0.1 to 2 eV with an error below a half of it.
+/// Standard errors are those that the rates' errors give, to first order, and larger where the law misfits the rates by
+/// clearly more than these. Returns nullopt if there are fewer temperatures, if the rates do not determine an energy of
+/// 0.1 to 2 eV with an error below a half of it, or if a current that doubles with a fixed number of degrees fits them
+/// as well: a floor would only absorb the difference of the two laws.
 std::optional<DarkLaw> fit_dark_law(std::span<const RateAtTemperature> rates);
 
 /// Dark current of all pixels together at one temperature, hot ones included (EMVA 1288 R4, section 7).

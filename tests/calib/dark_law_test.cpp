@@ -74,6 +74,25 @@ TEST(DarkLaw, ErrorsAreTheScatterOfNoisyRates) {
   }
 }
 
+// A current that doubles every so many degrees has no floor, and an Arrhenius law with one fits it badly.
+TEST(DarkLaw, IsAbsentWhereTheCurrentDoubles) {
+  std::mt19937_64 random(first_seed + 2);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> doubling(5, 9), current(0.5, 20);
+  int stated = 0;
+  constexpr int rounds = 200;
+  for (int round = 0; round < rounds; ++round) {
+    const double every_c = doubling(random), at_0_c = current(random);
+    std::vector<RateAtTemperature> rates;
+    for (int i = 0; i < 3 + round % 3; ++i) {
+      const double e_per_s = at_0_c * std::exp2(10 * i / every_c), error = 0.002 * e_per_s;
+      rates.push_back({10.0 * i, {e_per_s + error * normal(random), error}});
+    }
+    stated += fit_dark_law(rates) ? 1 : 0;
+  }
+  EXPECT_LE(stated, rounds / 20) << "seed " << first_seed + 2;  // chance alone makes some of three temperatures
+}
+
 TEST(DarkLaw, IsAbsentWhereRatesDoNotDetermineIt) {
   const SensorModel sensor = sensor_of(0.65, 0.4);
   EXPECT_FALSE(fit_dark_law({}));
