@@ -39,7 +39,7 @@ const char* name_of(ErrorCode code) {
 
 /// Returns the line that the command prints, without its name in front and without options of the command.
 std::string message_of(const Error& error) {
-  if (error.code == ErrorCode::exists) return error.where + ": it exists: overwrite=True replaces it";
+  if (error.message.find("--force") != std::string::npos) return error.where + " exists: overwrite=True replaces it";
   if (error.where.empty()) return error.message;
   constexpr std::string_view program = "lowlux: ";
   return cli::error_line(error.where, error).substr(program.size());

@@ -94,7 +94,12 @@ calib::NoiseFigures figures_of(const calib::PictureNoise& noise) {
                           .read_noise_e = std::sqrt(read_dn2) / gain,
                           .gain_factor = std::exp(gain_error),
                           .read_noise_factor = 1};
-  if (read_dn2 > 0) {  // ln R = ln(offset) / 2 - ln K
+  // A measurement that is not above 0 by its error limits the read noise only: half of the limit, within a factor of 2.
+  const double limit_dn2 = std::max(noise.offset_dn2.value - quantisation_dn2, 0.0) + noise.offset_dn2.standard_error;
+  if (read_dn2 < noise.offset_dn2.standard_error) {
+    out.read_noise_e = std::sqrt(limit_dn2) / gain / 2;
+    out.read_noise_factor = 2;
+  } else if (read_dn2 > 0) {  // ln R = ln(offset) / 2 - ln K
     const double offset_error = noise.offset_dn2.standard_error / (2 * read_dn2);
     const double shared = noise.covariance / (read_dn2 * gain);
     const double variance = offset_error * offset_error + gain_error * gain_error - shared;
@@ -255,9 +260,10 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
   if (given) return use_given(*given, *black, frame);
   const auto noise = calib::fit_picture_noise(frame.raw, black->pedestal_dn, {}, executor);
   if (noise) {
-    frame.noise = profile_of(noise->gain_dn_per_e.value, noise->offset_dn2.value, frame.raw, *black,
-                             NoiseProfile::Source::picture);
-    NoiseOrigin out{.source = NoiseOrigin::Source::picture, .figures = figures_of(*noise), .doubts = noise->reasons};
+    const calib::NoiseFigures figures = figures_of(*noise);
+    const double offset_dn2 = std::max(noise->offset_dn2.value, offset_dn2_of(figures, frame.raw));
+    frame.noise = profile_of(noise->gain_dn_per_e.value, offset_dn2, frame.raw, *black, NoiseProfile::Source::picture);
+    NoiseOrigin out{.source = NoiseOrigin::Source::picture, .figures = figures, .doubts = noise->reasons};
     warn_of_uncertainty(*noise, frame.warnings);
     return out;
   }

@@ -304,6 +304,11 @@ std::string info_json(const std::string& file, const RawFrame& frame, const std:
   }
   json["noise_profile"] =
       frame.noise ? Json{{"scale", frame.noise->scale}, {"offset", frame.noise->offset}} : Json(nullptr);
+  if (frame.noise && isp::electrons_at_white(raw, *frame.noise)) {  // of green
+    const double electrons = 1 / frame.noise->scale[1];
+    json["noise_profile"]["electrons_at_white"] = electrons;
+    json["noise_profile"]["read_noise_e"] = std::sqrt(std::max(frame.noise->offset[1], 0.0)) * electrons;
+  }
   json["noise_model"] = noise ? Json::parse(origin_json(*noise)) : Json(nullptr);
   if (frame.noise_ratio) json["noise_ratio_range"] = ratio_range(*frame.noise_ratio);
   json["exposure"] = exposure_json(raw.info);

@@ -141,9 +141,10 @@ Result<double> white_level_cd_m2(const RawFrame& frame, const FrameLight& light,
   if (by_profile) info.iso = choice.profile_iso;
   const std::optional<double> saturation = saturation_luminance_cd_m2(info);
   if (!saturation) {
-    return fail(ErrorCode::insufficient,
-                "the luminance of the scene is unknown: the estimate needs exposure time, f-number and ISO, and the "
-                "file lacks one; give its mean with --scene-luminance, in cd/m2");
+    return fail(
+        ErrorCode::insufficient,
+        "the luminance of the scene is unknown: the estimate needs exposure time, f-number and ISO, one of which "
+        "is not stated; give its mean in cd/m2 (--scene-luminance), or to a stage the illuminance in lux");
   }
   look.luminance_rule = by_profile ? "profile" : "exposure";
   const double white_cd_m2 = light.light_range * *saturation;

@@ -2,6 +2,8 @@
 import json
 import os
 
+import numpy as np
+
 from . import _lowlux
 from ._words import bytes_of, output_of, words_of
 from .errors import ArgumentError
@@ -53,7 +55,8 @@ class Profile:
         return gains[0]
 
     def variance_dn2(self, signal_dn, iso=None):
-        """Return the temporal variance of a raw value [DN^2], of the signal above black [DN], a number or an array.
+        """Return the temporal variance of a raw value [DN^2], of the signal above black [DN], a number or a sequence of
+        them, whose result is an array.
 
         Photon transfer (EMVA 1288 release 4.0, Eq. 15): K^2 sigma_d^2 + 1/12 + K signal_dn, with K the system gain
         [DN/e-] and sigma_d the read noise [e-]. Error: ArgumentError if the system gain is not known.
@@ -62,7 +65,8 @@ class Profile:
         if not sensor:
             raise ArgumentError("the profile does not state the system gain", "profile")
         gain, noise_e = sensor["system_gain_dn_per_e"]["value"], sensor["read_noise_e"]["value"]
-        return (gain * noise_e) ** 2 + 1 / 12 + gain * signal_dn
+        signal = signal_dn if isinstance(signal_dn, (int, float)) else np.asarray(signal_dn, dtype=float)
+        return (gain * noise_e) ** 2 + 1 / 12 + gain * signal
 
 
 # Options of the command that print, or that this function has arguments for.
