@@ -59,8 +59,12 @@ struct Darks {
   std::string mosaic;
   isp::Table frames;
   std::vector<std::pair<std::optional<double>, double>> gains_dn_per_e;  // that files state, with the ISO of each
-  std::optional<PerSite<double>> tagged_dn;                              // black level that the files state
-  double white_dn = 0;
+  struct Levels {
+    std::optional<double> iso;
+    PerSite<double> black_dn{};
+    double white_dn = 0;
+  };
+  std::vector<Levels> tagged;  // that files state, with the ISO of each
 };
 
 /// Returns the system gain that the noise profile of a frame states [DN/e-]; nullopt if there is none.
@@ -92,8 +96,9 @@ Result<Darks> read_darks(const CalibrateBlackArgs& args) {
     out.files.emplace_back(frame->raw.info.iso, file);
     list_frame(file, args.masked ? "masked pixels" : "dark", frame->raw.info, out.frames);
     const auto tagged = isp::choose_black(frame->raw, {.choice = isp::BlackChoice::metadata});
-    out.tagged_dn = tagged ? std::optional(tagged->pedestal_dn) : std::nullopt;
-    out.white_dn = *std::ranges::min_element(frame->raw.white_dn);
+    if (tagged) {
+      out.tagged.push_back({frame->raw.info.iso, tagged->pedestal_dn, *std::ranges::min_element(frame->raw.white_dn)});
+    }
     if (const auto gain = stated_gain(*frame)) out.gains_dn_per_e.emplace_back(frame->raw.info.iso, *gain);
     const auto dark = dark_part(*std::move(frame), args);
     if (!dark) return tl::make_unexpected(with_file(dark.error(), file));
@@ -108,20 +113,23 @@ Result<Darks> read_darks(const CalibrateBlackArgs& args) {
 /// brighter on one side.
 void warn_of_light(const calib::DarkGroup& group, const Darks& darks, std::vector<std::string>& warnings) {
   const PerSite<calib::DarkSite> sites = calib::sites_of(group);
-  if (darks.tagged_dn) {
+  const auto tagged = std::ranges::find(darks.tagged, group.setting.iso, &Darks::Levels::iso);
+  const bool is_tagged = tagged != darks.tagged.end();
+  if (is_tagged) {
     double level_dn = 0;
     for (const calib::DarkSite& site : sites) level_dn += site.spread.median / 4;
-    const double tagged_dn = mean_of(*darks.tagged_dn),
-                 fraction = (level_dn - tagged_dn) / (darks.white_dn - tagged_dn);
+    const double black_dn = mean_of(tagged->black_dn), fraction = (level_dn - black_dn) / (tagged->white_dn - black_dn);
     if (fraction > much_light) {
       warnings.push_back(fmt::format(
-          "the frames{} are {:.0f} % of the range above the black level of their files: if this is not dark "
-          "charge but light, cover the lens and take them again",
+          "the frames{} are {:.0f} % of the range above the black level of their files: if this is not dark charge but "
+          "light, cover the lens and take them again",
           group.setting.exposure_s ? fmt::format(" of {:g} s", *group.setting.exposure_s) : "", 100 * fraction));
     }
   }
   if (!group.setting.exposure_s) return;
-  if (const auto even = calib::check_even_dark(group, sites, darks.tagged_dn); !even) {
+  if (const auto even =
+          calib::check_even_dark(group, sites, is_tagged ? std::optional(tagged->black_dn) : std::nullopt);
+      !even) {
     warnings.push_back(even.error().message);
   }
 }

@@ -63,7 +63,7 @@ Result<isp::DevelopOptions> options_for(const RawBatch& batch, RawFrame& frame, 
   if (!dark) return tl::make_unexpected(dark.error());
   options.dark_frame = std::move(*dark);
   options.black = batch.options.black;  // the darks include it
-  if (of_profile && of_profile->noise) {
+  if (of_profile && frame.noise && frame.noise->source == NoiseProfile::Source::profile) {
     const auto level = isp::black_of(frame.raw, *options.dark_frame);
     const auto above = level ? calib::noise_above(*level, *of_profile, frame.raw) : std::nullopt;
     if (above) {

@@ -72,9 +72,9 @@ SquareDetail detail_at(const RgbView<const float>& xyz, int x, int y, int side) 
   return out;
 }
 
-/// Returns 1.4826 times the median of the details of the darkest tenth of the squares that are brighter than `dark`;
-/// the mean of both chromas.
-double median_detail(const RgbView<const float>& xyz, double dark, int side) {
+/// Returns 1.4826 times the median of the details of the darkest part of the squares that are brighter than `dark`, a
+/// tenth for a `fraction` of 10; the mean of both chromas.
+double median_detail(const RgbView<const float>& xyz, double dark, int side, std::size_t fraction) {
   constexpr std::size_t least = 64;
   std::vector<SquareDetail> squares;
   for (int y = 0; y + 2 * side <= xyz[0].height; y += 2 * side) {
@@ -84,7 +84,7 @@ double median_detail(const RgbView<const float>& xyz, double dark, int side) {
     }
   }
   if (squares.empty()) return 0;
-  const auto n = static_cast<std::ptrdiff_t>(std::min(squares.size(), std::max(squares.size() / 10, least)));
+  const auto n = static_cast<std::ptrdiff_t>(std::min(squares.size(), std::max(squares.size() / fraction, least)));
   std::nth_element(squares.begin(), squares.begin() + (n - 1), squares.end(),
                    [](const auto& a, const auto& b) { return a.intensity < b.intensity; });
   double mean = 0;
@@ -99,9 +99,12 @@ double median_detail(const RgbView<const float>& xyz, double dark, int side) {
 }  // namespace
 
 double chroma_noise_of(const RgbView<const float>& xyz, double dark) {
-  double largest = 0;
-  for (const int side : {1, 2, 4}) largest = std::max(largest, side * median_detail(xyz, dark, side));
-  return largest;
+  for (const std::size_t fraction : {10, 1}) {  // all of it where rounding leaves no noise in the dark
+    double largest = 0;
+    for (const int side : {1, 2, 4}) largest = std::max(largest, side * median_detail(xyz, dark, side, fraction));
+    if (largest > 0) return largest;
+  }
+  return 0;
 }
 
 Resaturated resaturate_picture(SceneLinear xyz, const ResaturateOptions& options, Executor& executor) {

@@ -30,8 +30,9 @@ struct Resaturated {
 /// the black point reduces saturation most; the mean of both: 1.4826 times the median of the absolute values of
 /// diagonal Haar details, in the darkest tenth of the image that is brighter than the black point. The texture of
 /// brighter areas would count as noise. Demosaicing and JPEG leave little of the noise between neighbours, so means
-/// over squares of 2 and 4 pixels are evaluated too, times 2 and 4, and the largest counts. Returns 0 for images of
-/// fewer than 2 x 2 pixels.
+/// over squares of 2 and 4 pixels are evaluated too, times 2 and 4, and the largest counts. Where rounding leaves
+/// no noise there, it is that of the whole image above the black point. Returns 0 for images of fewer than 2 x 2
+/// pixels, and for those without noise or without anything above the black point.
 /// @param dark  X + Y + Z of the black point
 double chroma_noise_of(const RgbView<const float>& xyz, double dark);
 

@@ -181,7 +181,7 @@ double light_range_of(const RawFrame& frame, const RawLevels& levels) {
   double sum = 0;
   for (int site = 0; site < 4; ++site) {
     const double range_dn = white_at(raw, site) - levels.black.pedestal_dn[site];
-    double share = dark_dn ? range_dn / (range_dn + (*dark_dn)[site]) : 1;
+    double share = dark_dn ? range_dn / (range_dn + std::max((*dark_dn)[site], 0.0)) : 1;
     if (levels.electrons_at_white) share *= light_at_white_e(levels)[site] / (*levels.electrons_at_white)[site];
     sum += share / 4;
   }
