@@ -47,7 +47,7 @@ std::string warning_of(const DarkCharge& dark, const FrameInfo& info);
 Thumbnail light_of(const Thumbnail& thumbnail, const RawFrame& frame, const RawLevels& levels);
 
 /// Returns Thumbnail::light_range: a pixel is saturated by light and dark charge together, so that white is less light
-/// than the exposure alone tells (saturation_luminance_cd_m2). It is 1 where the pedestal is not tagged, and for raws
+/// than the exposure alone states (saturation_luminance_cd_m2). It is 1 where the pedestal is not tagged, and for raws
 /// that were written without their dark charge, which do not state how large it was.
 double light_range_of(const RawFrame& frame, const RawLevels& levels);
 

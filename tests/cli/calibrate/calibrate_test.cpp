@@ -138,6 +138,16 @@ TEST_F(Calibrate, BlackTakesTheGainFromTheDarkChargeOrSaysThatItCannot) {
   EXPECT_FALSE(exists("q.json"));
 }
 
+TEST_F(Calibrate, BlackWarnsOfFramesThatAreFarAboveTheirBlackLevel) {
+  const auto dark = lowlux(joined({"calibrate", "black", "-o", file("p.json")}, shoot("a", "dark", "0.001", 4)));
+  ASSERT_EQ(dark.exit_code, 0) << dark.err;
+  EXPECT_FALSE(holds(dark.err, "light")) << dark.err;
+  const Words lit = shoot("b", "flat", "0.1", 4, {"--luminance", "1"});
+  const auto done = lowlux(joined({"calibrate", "black", "-o", file("q.json")}, lit));
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_TRUE(holds(done.err, "of the range above the black level of their files")) << done.err;
+}
+
 TEST_F(Calibrate, NoiseFindsGainReadNoiseAndFullWell) {
   const Words darks = shoot("d", "dark", "0.001", 4);
   Words flats;
