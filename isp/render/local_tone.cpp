@@ -139,6 +139,14 @@ Cells cells_of(const LocalTone& how, const PlaneView<const float>& variance, con
     const float base = out.slope.at(x, y) * level.at(x, y) + out.level.at(x, y), noise = out.noise.at(x, y);
     out.most_lift.at(x, y) = known ? largest_lift_ev(middle_grey * std::exp2(base) - noise, noise) : most_lift_ev;
   });
+  const Plane<float> own = out.most_lift.clone();
+  for_each_cell(level, executor, [&](int x, int y) {
+    for (int j = std::max(0, y - 1); j <= std::min(height - 1, y + 1); ++j) {
+      for (int i = std::max(0, x - 1); i <= std::min(width - 1, x + 1); ++i) {
+        out.most_lift.at(x, y) = std::max(out.most_lift.at(x, y), own.at(i, j));
+      }
+    }
+  });
   return out;
 }
 

@@ -30,9 +30,9 @@ inline constexpr double local_tone_noise = 2;
 ///     e = -share B (1 - B / W),            B = 0..W,    in the lights,   W = log2(limit / 0.18)
 /// Even areas keep their order for every share, and middle grey, black and white stay. M is the largest lift at which
 /// the noise of an even area of that luminance stays below local_tone_noise in CIE L*, after the standard tone curve
-/// too: gain_within_noise_limit. n is at most the geometric mean of the noise over such a square: noise reduction
-/// leaves more noise next to lamps, where less lift would be seen as a dark disc. The result does not depend on the
-/// number of threads.
+/// too: gain_within_noise_limit. It is the largest M of a cell and its neighbours, and n is at most the geometric mean
+/// of the noise over such a square: noise reduction leaves more noise next to lamps, where less lift would be seen as a
+/// dark disc. The result does not depend on the number of threads.
 /// @param variance  of the noise of Y, one value for each cell of 4 x 4 pixels: ceil(height / 4) x ceil(width / 4);
 ///                  without data the noise is unknown: nothing is limited, and n = 2^-12 of middle grey
 void apply_local_tone(const LocalTone& how, PlaneView<const float> variance, const RgbView<float>& rgb,

@@ -187,6 +187,13 @@ SceneLinear reference(const SceneLinear& in, const LocalTone& how, const Plane<f
     }
     most[i] = low;
   }
+  const Grid own_most = most;
+  for (int i = 0; i < across * down; ++i) {
+    for (int k = 0; k < 9; ++k) {
+      const int x = i % across + k % 3 - 1, y = i / across + k / 3 - 1;
+      if (x >= 0 && y >= 0 && x < across && y < down) most[i] = std::max(most[i], own_most[y * across + x]);
+    }
+  }
   SceneLinear out = copy_of(in);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {

@@ -45,7 +45,7 @@ struct Sky {
 
 /// The sky drifts and turns from frame to frame.
 inline Burst night(const Sky& sky, double turn_deg = 0.15) {
-  Burst burst{.width = 256, .height = 192, .read_noise_e = 3, .neutral = {1, 1, 1}};
+  Burst burst{.width = 256, .height = 192, .read_noise_e = 3};
   burst.scene = [&sky](double x, double y, int) { return sky.at(x, y); };
   burst.position = [turn_deg](int index, double x, double y) {
     const double turn = turn_deg * index * std::numbers::pi / 180;
