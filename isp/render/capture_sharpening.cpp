@@ -122,47 +122,53 @@ Plane<float> window_mean(int width, int height, int reach, Executor& executor, c
   return out;
 }
 
-/// Returns the least of value(x, y) over the pixels at most `reach` away along each axis.
-template <class Value>
-Plane<float> window_least(int width, int height, int reach, Executor& executor, const Value& value) {
-  Plane<float> rows(width, height), out(width, height);
-  for_each_pixel(width, height, executor, [&](int x, int y) {
-    float least = value(x, y);
-    for (int i = std::max(0, x - reach); i <= std::min(width - 1, x + reach); ++i) least = std::min(least, value(i, y));
-    rows.at(x, y) = least;
-  });
-  for_each_pixel(width, height, executor, [&](int x, int y) {
-    float least = rows.at(x, y);
-    for (int j = std::max(0, y - reach); j <= std::min(height - 1, y + reach); ++j) {
-      least = std::min(least, rows.at(x, j));
-    }
-    out.at(x, y) = least;
-  });
-  return out;
-}
-
 /// Returns the factor of the detail: 0 for pixels within `reach` of a saturated one, rising to 1 over twice ramp_px
-/// farther ones.
+/// farther ones; empty where it is 1 everywhere.
 Plane<float> far_from_saturation(const CaptureSharpening& how, const RgbView<float>& rgb, int reach,
                                  Executor& executor) {
-  const int width = rgb[0].width, height = rgb[0].height;
-  Plane<float> mask(width, height);
-  for_each_pixel(width, height, executor, [&](int x, int y) {
-    bool saturated = false;
-    for (std::size_t c = 0; c < 3; ++c) saturated = saturated || rgb[c].row(y)[x] >= saturated_from * how.saturation[c];
-    mask.at(x, y) = saturated ? 0.0f : 1.0f;
+  const int width = rgb[0].width, height = rgb[0].height, beyond = reach + ramp_px;
+  Plane<float> rows(width, height), least(width, height);
+  std::vector<std::uint8_t> found(static_cast<std::size_t>(executor.width()), 0);
+  for_each_band(executor, height, [&](const RowBand& band, int index) {
+    for (int y = band.first; y < band.last; ++y) {
+      float* const row = rows.row(y);
+      std::fill_n(row, width, 1.0f);
+      for (int x = 0; x < width; ++x) {
+        bool saturated = false;
+        for (std::size_t c = 0; c < 3; ++c) {
+          saturated = saturated || rgb[c].row(y)[x] >= saturated_from * how.saturation[c];
+        }
+        if (!saturated) continue;
+        std::fill(row + std::max(0, x - beyond), row + std::min(width, x + beyond + 1), 0.0f);
+        found[static_cast<std::size_t>(index)] = 1;
+      }
+    }
   });
-  const Plane<float> unsaturated =
-      window_least(width, height, reach + ramp_px, executor, [&](int x, int y) { return mask.at(x, y); });
-  return window_mean(width, height, ramp_px, executor, [&](int x, int y) { return unsaturated.at(x, y); });
+  if (std::ranges::count(found, 1) == 0) return {};
+  for_each_band(executor, height, [&](const RowBand& band, int /*index*/) {
+    for (int y = band.first; y < band.last; ++y) {
+      float* const to = least.row(y);
+      std::copy_n(rows.row(y), width, to);
+      for (int j = std::max(0, y - beyond); j <= std::min(height - 1, y + beyond); ++j) {
+        const float* const from = rows.row(j);
+        for (int x = 0; x < width; ++x) to[x] = std::min(to[x], from[x]);
+      }
+    }
+  });
+  rows = Plane<float>();
+  return window_mean(width, height, ramp_px, executor, [&](int x, int y) { return least.at(x, y); });
 }
 
-/// Returns what each value of a channel is not lowered below: a little less than the least value around.
-Plane<float> lower_limit(const PlaneView<float>& channel, Executor& executor) {
-  Plane<float> out =
-      window_least(channel.width, channel.height, limit_px, executor, [&](int x, int y) { return channel.row(y)[x]; });
-  for (std::size_t i = 0; i < out.size(); ++i) out.data()[i] *= out.data()[i] > 0 ? limit_of_least : 1;
-  return out;
+/// Returns what a value of a channel is not lowered below: a little less than the least value around.
+float lower_limit(const PlaneView<float>& channel, int x, int y) {
+  float least = channel.row(y)[x];
+  for (int j = std::max(0, y - limit_px); j <= std::min(channel.height - 1, y + limit_px); ++j) {
+    const float* const row = channel.row(j);
+    for (int i = std::max(0, x - limit_px); i <= std::min(channel.width - 1, x + limit_px); ++i) {
+      least = std::min(least, row[i]);
+    }
+  }
+  return least > 0 ? limit_of_least * least : least;
 }
 
 }  // namespace
@@ -193,23 +199,24 @@ void sharpen_capture(const CaptureSharpening& how, PlaneView<const float> varian
     for (std::size_t c = 0; c < 3; ++c) sum += how.luminance[c] * rgb[c].row(y)[x];
     luminance.at(x, y) = sum;
   });
-  const Plane<float> detail = detail_of(luminance, half, executor);
+  Plane<float> detail = detail_of(luminance, half, executor);
   const Plane<float> signal =
       window_mean(width, height, window_px, executor, [&](int x, int y) { return detail.at(x, y) * detail.at(x, y); });
   const int reach = (terms + 1) * (static_cast<int>(half.size()) - 1);
   const Plane<float> allowed = far_from_saturation(how, rgb, reach, executor);
   const auto noise_gain = static_cast<float>(detail_noise_gain(how.blur_px));
-  const std::array<Plane<float>, 3> limit{lower_limit(rgb[0], executor), lower_limit(rgb[1], executor),
-                                          lower_limit(rgb[2], executor)};
   for_each_pixel(width, height, executor, [&](int x, int y) {
+    float& change = detail.at(x, y);
     const float noise = over_noise * noise_gain * variance.row(y / cell_px)[x / cell_px];
-    if (!(allowed.at(x, y) > 0 && signal.at(x, y) > noise)) return;
-    float change = allowed.at(x, y) * (1 - noise / signal.at(x, y)) * detail.at(x, y);
-    if (change < 0) {
-      for (std::size_t c = 0; c < 3; ++c)
-        change = std::max(change, std::min(limit[c].at(x, y) - rgb[c].row(y)[x], 0.0f));
+    change *= signal.at(x, y) > noise ? 1 - noise / signal.at(x, y) : 0;
+    if (!allowed.empty()) change *= allowed.at(x, y);
+    for (std::size_t c = 0; c < 3 && change < 0; ++c) {
+      change = std::max(change, std::min(lower_limit(rgb[c], x, y) - rgb[c].row(y)[x], 0.0f));
     }
-    for (std::size_t c = 0; c < 3; ++c) rgb[c].row(y)[x] += change;
+  });
+  for_each_pixel(width, height, executor, [&](int x, int y) {
+    if (detail.at(x, y) == 0) return;
+    for (std::size_t c = 0; c < 3; ++c) rgb[c].row(y)[x] += detail.at(x, y);
   });
 }
 
