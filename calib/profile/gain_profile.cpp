@@ -76,6 +76,7 @@ SensorModel& begin_sensor(const FrameSetting& setting, const Estimate& gain, dou
   s.bits = std::max(1, static_cast<int>(std::bit_width(static_cast<unsigned>(s.white_level_dn))));
   if (is_new) {
     s.full_well_e = (s.white_level_dn - black_dn) / gain.value;
+    out.errors.full_well_e = s.full_well_e * gain.standard_error / gain.value;
     note(assumed("full well", "taken as the charge at the white level", measured), out);
   }
   return s;
@@ -172,7 +173,7 @@ void put_photon_transfer(const PhotonTransfer& transfer, const FrameSetting& dar
     out.errors.read_noise_e = transfer.read_noise_e->standard_error;
   } else {
     sensor.read_noise_e = dithered_deviation_dn / sensor.system_gain_dn_per_e;
-    out.errors.read_noise_e = 0;
+    out.errors.read_noise_e = sensor.read_noise_e / 2;
     note(assumed("read noise", "the darks scatter by less than half a code: at most this", measured), out);
   }
   sensor.row_noise_e = transfer.row_noise_e;

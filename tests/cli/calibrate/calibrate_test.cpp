@@ -165,6 +165,7 @@ TEST_F(Calibrate, NoiseFindsGainReadNoiseAndFullWell) {
   EXPECT_NEAR(sensor["system_gain_dn_per_e"]["value"], 0.5,
               5 * sensor["system_gain_dn_per_e"]["standard_error"].get<double>());
   EXPECT_NEAR(sensor["read_noise_e"]["value"], 2, 5 * sensor["read_noise_e"]["standard_error"].get<double>());
+  EXPECT_GT(sensor["full_well_e"]["standard_error"].get<double>(), 0);
   EXPECT_TRUE(holds(scratch_.read("p.html"), "Photon transfer curve"));
 
   // The black point of darks is added to it, with its gain.
