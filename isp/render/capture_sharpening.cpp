@@ -208,7 +208,7 @@ void sharpen_capture(const CaptureSharpening& how, PlaneView<const float> varian
   for_each_pixel(width, height, executor, [&](int x, int y) {
     float& change = detail.at(x, y);
     const float noise = over_noise * noise_gain * variance.row(y / cell_px)[x / cell_px];
-    change *= signal.at(x, y) > noise ? 1 - noise / signal.at(x, y) : 0;
+    change = signal.at(x, y) > noise ? (1 - noise / signal.at(x, y)) * change : 0;
     if (!allowed.empty()) change *= allowed.at(x, y);
     for (std::size_t c = 0; c < 3 && change < 0; ++c) {
       change = std::max(change, std::min(lower_limit(rgb[c], x, y) - rgb[c].row(y)[x], 0.0f));

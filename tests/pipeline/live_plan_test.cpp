@@ -180,6 +180,40 @@ TEST(LivePlanner, BlackIsGivenElseMaskedElseTheDarkestPlace) {
   EXPECT_EQ(bordered->decided().levels.black.pedestal_dn, *known().black_dn);
 }
 
+// The dark charge of masked pixels fills part of the range: what is left for light saturates at less luminance.
+TEST(LivePlanner, TheLuminanceOfTheSceneDoesNotDependOnTheDarkCharge) {
+  InlineExecutor one;
+  const auto mean_cd_m2 = [&](int dark_dn) {
+    RawFrame frame = night(waves(60), 1, 256, 200);
+    for (int y = 0; y < 200; ++y) {
+      for (int x = 0; x < 256; ++x) {
+        const double dn = y < 4 ? test::night_black_dn : frame.raw.dn.at(x, y);
+        frame.raw.dn.at(x, y) = static_cast<std::uint16_t>(dn + dark_dn);
+      }
+    }
+    LiveSetup setup = setup_of(frame);
+    setup.active = {0, 4, 256, 196};
+    setup.masked = {{0, 0, 256, 4}};
+    setup.look.look = Look::eye;
+    LiveFacts facts = known();
+    facts.black_dn.reset();
+    facts.exposure_s = 2;
+    facts.iso = 1600;
+    facts.f_number = 2;
+    facts.noise->pedestal_dn.emplace();
+    facts.noise->pedestal_dn->fill(test::night_black_dn);
+    facts.noise->read_variance_dn2 = 10;
+    const auto live = live_of(setup, one);
+    read(*live, frame);
+    const auto planned = live->plan(facts);
+    EXPECT_TRUE(planned) << planned.error().message;
+    return live->decided().rendering.look->mean_cd_m2;
+  };
+  const double expected = mean_cd_m2(0);
+  EXPECT_GT(expected, 0);
+  for (const int dark_dn : {100, 3000}) EXPECT_NEAR(mean_cd_m2(dark_dn), expected, 1e-5 * expected) << dark_dn << " DN";
+}
+
 TEST(LivePlanner, SaturationKeepsLuminanceAndTheGivenMatrixIsTaken) {
   InlineExecutor one;
   const RawFrame frame = night(waves(150));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -227,6 +228,23 @@ TEST(CaptureSharpening, LeavesNoDarkRingsOrLines) {
       for (std::size_t i = 0; i < out.plane[c].size(); ++i) ASSERT_GE(out.plane[c].data()[i], 0.74F * 0.01F) << blur;
     }
     EXPECT_GT(out.plane[1].at(16, 32), 1.05F * in.plane[1].at(16, 32)) << "the point is sharpened";
+  }
+}
+
+TEST(CaptureSharpening, APixelThatIsNoNumberChangesNoOther) {
+  SceneLinear in(40, 40);
+  for (auto& plane : in.plane) {
+    std::fill_n(plane.data(), plane.size(), 0.2F);
+    plane.at(20, 20) = std::numeric_limits<float>::quiet_NaN();
+  }
+  const SceneLinear out = sharpened(in, {.blur_px = 0.6F}, 1e-6);
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < 40; ++y) {
+      for (int x = 0; x < 40; ++x) {
+        if (x == 20 && y == 20) continue;
+        ASSERT_EQ(out.plane[c].at(x, y), 0.2F) << x << " " << y;
+      }
+    }
   }
 }
 

@@ -78,8 +78,8 @@ bool forget_largest_resident() {
   const bool forgotten = forget_largest_resident();
   const double before = largest_resident_bytes();
   const double added = forgotten && work() ? largest_resident_bytes() - before : -1;
-  const bool told = write(to, &added, sizeof added) == static_cast<ssize_t>(sizeof added);
-  _exit(told ? 0 : 1);
+  const bool is_sent = write(to, &added, sizeof added) == static_cast<ssize_t>(sizeof added);
+  _exit(is_sent ? 0 : 1);
 }
 
 /// Returns the physical memory of the machine [bytes].

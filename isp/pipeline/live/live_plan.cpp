@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "isp/model/sensor/masked_noise.h"
+#include "isp/pipeline/plan/dark_charge.h"
 #include "isp/pipeline/plan/plan_look.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/plan/rendering.h"
@@ -87,15 +88,12 @@ LiveNoise with_masked_charge(LiveNoise noise, const BlackPoint& black) {
   return noise;
 }
 
-/// Returns Thumbnail::light_range: 1 where the pedestal is not known apart from the dark charge.
-double light_range_of(const RawDn& raw, const BlackPoint& black, const std::optional<LiveNoise>& noise) {
-  if (!noise || !noise->pedestal_dn || black.source != BlackPoint::Source::masked_pixels) return 1;
-  double sum = 0;
-  for (int site = 0; site < 4; ++site) {
-    const double range_dn = white_at(raw, site) - black.pedestal_dn[site];
-    sum += range_dn / std::max(white_at(raw, site) - (*noise->pedestal_dn)[site], range_dn) / 4;
-  }
-  return sum;
+/// Returns the dark charge in a black point of masked pixels [DN]; 0 where the pedestal is not known apart from it.
+PerSite<double> dark_dn_of(const BlackPoint& black, const std::optional<LiveNoise>& noise) {
+  PerSite<double> out{};
+  if (!noise || !noise->pedestal_dn || black.source != BlackPoint::Source::masked_pixels) return out;
+  for (int site = 0; site < 4; ++site) out[site] = black.pedestal_dn[site] - (*noise->pedestal_dn)[site];
+  return out;
 }
 
 /// Returns the camera RGB of daylight; equal channels where no calibration states it.
@@ -358,7 +356,8 @@ Result<void> LivePlanner::plan(const LiveFacts& facts, FrameMeter& meter, RawFra
   if (Result<void> black = set_black(facts, meter, frame); !black) return black;
   set_noise(facts, meter, frame);
   if (needs_light(facts)) meter.thumbnail().make(frame, plan_.levels.black, thumbnail_);
-  thumbnail_.light_range = light_range_of(frame.raw, plan_.levels.black, facts.noise);
+  plan_.levels.stated_dark_dn = dark_dn_of(plan_.levels.black, facts.noise);
+  thumbnail_.light_range = light_range_of(frame, plan_.levels);
   if (Result<void> rendering = set_rendering(facts, frame); !rendering) return rendering;
   choose_level(facts.denoise, frame);
   set_temporal(facts, frame);

@@ -143,6 +143,18 @@ double headroom_ev(const std::array<float, 3>& white_gain, const DevelopOptions&
   return std::log2(static_cast<double>(*std::ranges::max_element(white_gain)));
 }
 
+/// Balances camera RGB by the white of the shot for as long as missing colours are interpolated, which relies on greys
+/// of equal values: the matrix takes the gains back.
+void balance_interpolation(const RawFrame& frame, Rendering& out) {
+  const std::optional<Vector3>& neutral = frame.colour.as_shot_neutral;
+  if (frame.raw.layout != SensorLayout::bayer || !neutral) return;
+  for (const double share : *neutral) {
+    if (!(share > 1e-3 && share < 1e3)) return;
+  }
+  out.white_gain = white_gain_of(*neutral);
+  for (int i = 0; i < 9; ++i) out.transform.matrix[i] /= out.white_gain[i % 3];
+}
+
 }  // namespace
 
 bool has_unknown_colours(const RawFrame& frame, OutputSpace space) {
@@ -217,18 +229,6 @@ RgbTransform transform_of(const Matrix3& balanced, const Rendering& rendering, c
   out.clip = keeps_all ? INFINITY : 1.0f;
   out.move_into_gamut = options.samples != SampleType::f32;
   return out;
-}
-
-/// Balances camera RGB by the white of the shot for as long as missing colours are interpolated, which relies on greys
-/// of equal values: the matrix takes the gains back.
-void balance_interpolation(const RawFrame& frame, Rendering& out) {
-  const std::optional<Vector3>& neutral = frame.colour.as_shot_neutral;
-  if (frame.raw.layout != SensorLayout::bayer || !neutral) return;
-  for (const double share : *neutral) {
-    if (!(share > 1e-3 && share < 1e3)) return;
-  }
-  out.white_gain = white_gain_of(*neutral);
-  for (int i = 0; i < 9; ++i) out.transform.matrix[i] /= out.white_gain[i % 3];
 }
 
 ToneTable tone_of(double limit, const DevelopOptions& options) {
