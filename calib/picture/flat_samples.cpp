@@ -274,20 +274,36 @@ Steps steps_of(const std::vector<std::int64_t>& count) {
 /// Returns the mean size of second differences at each phase of an 8 x 8 grid of one colour's pixels, across columns or
 /// rows.
 std::array<double, grid> restlessness(const RawDn& raw, bool across_columns) {
-  std::array<double, grid> sum{}, n{};
+  constexpr int period = 2 * grid;  // pixels
   const int dx = across_columns ? 2 : 0, dy = across_columns ? 0 : 2;
+  const std::ptrdiff_t step = across_columns ? 2 : 2 * raw.dn.view().stride;
+  std::array<std::int64_t, grid> sum{}, n{};
   for (int y = 2 * dy; y < raw.active.height - dy; ++y) {
-    for (int x = 2 * dx; x < raw.active.width - dx; ++x) {
-      const auto at = [&](int i) {
-        return static_cast<int>(raw.dn.at(raw.active.x + x + i * dx, raw.active.y + y + i * dy));
-      };
-      const int phase = (across_columns ? x / 2 : y / 2) % grid;
-      sum[phase] += std::abs(3 * (at(0) - at(-1)) - at(1) + at(-2));
-      n[phase] += 1;
+    const std::uint16_t* const row = raw.dn.row(raw.active.y + y) + raw.active.x;
+    const auto size_at = [&](int x) {
+      const std::uint16_t* const at = row + x;
+      return std::abs(3 * (at[0] - at[-step]) - at[step] + at[-2 * step]);
+    };
+    std::array<int, period> of_row{}, n_of_row{};  // by column from the first, modulo the period
+    const int first = 2 * dx, last = raw.active.width - dx;
+    int x = first;
+    for (; x + period <= last; x += period) {
+      for (int k = 0; k < period; ++k) of_row[k] += size_at(x + k);
+      for (int& count : n_of_row) ++count;
+    }
+    for (; x < last; ++x) {
+      of_row[(x - first) % period] += size_at(x);
+      ++n_of_row[(x - first) % period];
+    }
+    for (int k = 0; k < period; ++k) {
+      const int phase = (across_columns ? (first + k) / 2 : y / 2) % grid;
+      sum[phase] += of_row[k];
+      n[phase] += n_of_row[k];
     }
   }
-  for (int p = 0; p < grid; ++p) sum[p] = n[p] > 0 ? sum[p] / n[p] : 0;
-  return sum;
+  std::array<double, grid> out{};
+  for (int p = 0; p < grid; ++p) out[p] = n[p] > 0 ? static_cast<double>(sum[p]) / static_cast<double>(n[p]) : 0;
+  return out;
 }
 
 /// Returns the relative excess of the largest phase above the quiet ones, or 0 if it is within their scatter. A step
@@ -300,16 +316,24 @@ double excess_of(std::array<double, grid> phase) {
 
 }  // namespace
 
-RawTraces code_traces(const RawDn& raw) {
+RawTraces code_traces(const RawDn& raw, Executor& executor) {
+  std::array<Steps, 4> steps_of_site;
+  std::array<double, 2> excess{};
+  for_each_index(executor, 6, [&](int task) {
+    if (task < 2) {
+      excess[task] = excess_of(restlessness(raw, task == 0));
+    } else {
+      steps_of_site[task - 2] = steps_of(histogram(raw, task - 2));
+    }
+  });
   RawTraces out;
-  for (int site = 0; site < 4; ++site) {
-    const Steps steps = steps_of(histogram(raw, site));
+  for (const Steps& steps : steps_of_site) {
     if (steps.smallest == 0) continue;
     out.code_step_dn = std::max(out.code_step_dn, steps.smallest);
     out.largest_step_dn = std::max(out.largest_step_dn, steps.largest);
     out.companded = out.companded || steps.largest > steps.smallest;
   }
-  out.grid_excess = std::max(excess_of(restlessness(raw, true)), excess_of(restlessness(raw, false)));
+  out.grid_excess = std::max(excess[0], excess[1]);
   out.block_grid = out.grid_excess > min_excess;
   return out;
 }

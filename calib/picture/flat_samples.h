@@ -74,7 +74,7 @@ inline constexpr double min_fine_to_coarse = 0.7;
 
 /// Measures steps and grid of the active area; fine_to_coarse is left at 0. Steps are measured where codes are dense
 /// (30 pixels for each code): in at least a sixteenth of the range in use.
-RawTraces code_traces(const RawDn& raw);
+RawTraces code_traces(const RawDn& raw, Executor& executor);
 
 /// Sets fine_to_coarse, and `denoised` from it.
 void add_filter_trace(const NoiseSamples& blocks_by_surroundings, RawTraces& traces);

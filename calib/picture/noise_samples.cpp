@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 
 namespace lowlux::calib {
@@ -12,14 +13,14 @@ namespace {
 constexpr int side = noise_block;
 using Block = std::array<float, side * side>;
 
-/// Returns the matrix of the orthonormal cosine transform, one row for each frequency u.
+/// Returns the matrix of the orthonormal cosine transform, [x][u] for position x and frequency u.
 const std::array<std::array<float, side>, side>& cosines() {
   static const auto table = [] {
     std::array<std::array<float, side>, side> out{};
     for (int u = 0; u < side; ++u) {
       const double scale = std::sqrt((u == 0 ? 1.0 : 2.0) / side);
       for (int x = 0; x < side; ++x) {
-        out[u][x] = static_cast<float>(scale * std::cos(std::numbers::pi * u * (2 * x + 1) / (2 * side)));
+        out[x][u] = static_cast<float>(scale * std::cos(std::numbers::pi * u * (2 * x + 1) / (2 * side)));
       }
     }
     return out;
@@ -54,27 +55,31 @@ struct Lattice {
   std::uint8_t site;  // the lowest of its sites
   int ux, uy, vx, vy;
 
-  /// Returns a value above black.
-  float at(int x, int y, int u, int v) const {
-    const int column = x + u * ux + v * vx, row = y + u * uy + v * vy;
-    return static_cast<float>(raw.dn.at(raw.active.x + column, raw.active.y + row)) - black_dn[site_of(column, row)];
+  /// Returns the code of pixel (0, 0) at (x, y); those of others lie u along() + v across() further.
+  const std::uint16_t* at(int x, int y) const { return raw.dn.row(raw.active.y + y) + raw.active.x + x; }
+  std::ptrdiff_t along() const { return ux + uy * raw.dn.view().stride; }
+  std::ptrdiff_t across() const { return vx + vy * raw.dn.view().stride; }
+
+  /// Returns the black of the pixels with an even and with an odd u + v from (x, y): the two greens of a Bayer mosaic
+  /// differ.
+  std::array<float, 2> black_at(int x, int y) const {
+    return {black_dn[site_of(x, y)], black_dn[site_of(x + ux, y + uy)]};
   }
 };
 
+// The innermost loops run over frequencies, whose sums are independent of each other.
 void transform(const Block& in, Block& out) {
   const auto& c = cosines();
-  Block half;
+  Block half{};
   for (int y = 0; y < side; ++y) {
-    for (int u = 0; u < side; ++u) {
-      float sum = 0;
-      for (int x = 0; x < side; ++x) sum += c[u][x] * in[y * side + x];
-      half[y * side + u] = sum;
+    for (int x = 0; x < side; ++x) {
+      for (int u = 0; u < side; ++u) half[y * side + u] += c[x][u] * in[y * side + x];
     }
   }
   out.fill(0);
   for (int v = 0; v < side; ++v) {
     for (int y = 0; y < side; ++y) {
-      for (int u = 0; u < side; ++u) out[v * side + u] += c[v][y] * half[y * side + u];
+      for (int u = 0; u < side; ++u) out[v * side + u] += c[y][v] * half[y * side + u];
     }
   }
 }
@@ -83,19 +88,28 @@ constexpr int block_window = side + 2 * noise_border;
 constexpr double block_step_fraction = 1.0 / (side * side) + 1.0 / (block_window * block_window - side * side);
 
 NoiseSample block_sample(const Lattice& lattice, int x0, int y0) {
+  const std::uint16_t* const first = lattice.at(x0, y0);
+  const std::ptrdiff_t along = lattice.along(), across = lattice.across();
+  const std::array<float, 2> black = lattice.black_at(x0, y0);
   Block pixels, details;
-  float all = 0, inside = 0;
+  int all = 0, inside = 0;
   for (int y = -noise_border; y < side + noise_border; ++y) {
-    for (int x = -noise_border; x < side + noise_border; ++x) {
-      const float value = lattice.at(x0, y0, x, y);
-      all += value;
-      if (x < 0 || x >= side || y < 0 || y >= side) continue;
-      inside += value;
-      pixels[y * side + x] = value;
+    for (int x = -noise_border; x < side + noise_border; ++x) all += first[x * along + y * across];
+  }
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const int code = first[x * along + y * across];
+      inside += code;
+      pixels[y * side + x] = static_cast<float>(code) - black[(x + y) & 1];
     }
   }
-  NoiseSample out{.mean_dn = inside / (side * side),
-                  .around_dn = (all - inside) / (block_window * block_window - side * side),
+  // Half of the pixels of either sum have either black.
+  const double mean_black = 0.5 * (static_cast<double>(black[0]) + black[1]);
+  const auto mean = [&](int sum, int count) {
+    return static_cast<float>(sum / static_cast<double>(count) - mean_black);
+  };
+  NoiseSample out{.mean_dn = mean(inside, side * side),
+                  .around_dn = mean(all - inside, block_window * block_window - side * side),
                   .site = lattice.site};
   for (float& p : pixels) p -= out.mean_dn;
   transform(pixels, details);
@@ -123,9 +137,13 @@ NoiseSample detail_sample(const Lattice& lattice, int x0, int y0) {
   constexpr std::array<float, 3> second_difference{1, -2, 1};
   Parts sum{};
   float detail = 0;
+  const std::uint16_t* const middle = lattice.at(x0, y0);
+  const std::ptrdiff_t along = lattice.along(), across = lattice.across();
+  const std::array<float, 2> black = lattice.black_at(x0, y0);
   for (int y = 0; y < 7; ++y) {
     for (int x = 0; x < 7; ++x) {
-      const float value = lattice.at(x0, y0, x - detail_reach, y - detail_reach);
+      const int code = middle[(x - detail_reach) * along + (y - detail_reach) * across];
+      const float value = static_cast<float>(code) - black[(x + y) & 1];
       sum[3 * part[y] + part[x]] += value;
       if (part[x] == 1 && part[y] == 1) detail += second_difference[x - 2] * second_difference[y - 2] * value;
     }

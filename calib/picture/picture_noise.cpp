@@ -167,11 +167,13 @@ struct Evidence {
 };
 
 /// Returns the range of codes of each site, or the error of a frame that is clipped nearly everywhere.
-Result<PerSite<ClipRange>> clip_ranges(const RawDn& raw, const PerSite<double>& black_dn) {
+Result<PerSite<ClipRange>> clip_ranges(const RawDn& raw, const PerSite<double>& black_dn, Executor& executor) {
+  PerSite<SiteRange> of_site;
+  for_each_index(executor, 4, [&](int site) { of_site[site] = range_of(raw, black_dn[site], site); });
   PerSite<ClipRange> clip;
   double clipped = 0, pixels = 0;
   for (int site = 0; site < 4; ++site) {
-    const SiteRange range = range_of(raw, black_dn[site], site);
+    const SiteRange& range = of_site[site];
     clip[site] = range.clip;
     clipped += range.clipped;
     pixels += range.pixels;
@@ -194,10 +196,10 @@ Result<Evidence> make_evidence(const RawDn& raw, const PerSite<double>& black_dn
                 fmt::format("{} x {} pixels give {} blocks of 16 x 16, and 100 are needed: give a larger picture",
                             raw.active.width, raw.active.height, blocks.sample.size()));
   }
-  const auto clip = clip_ranges(raw, black_dn);
+  const auto clip = clip_ranges(raw, black_dn, executor);
   if (!clip) return tl::make_unexpected(clip.error());
   sort_by_surroundings(blocks);
-  Evidence out{.samples = {}, .clip = *clip, .traces = code_traces(raw)};
+  Evidence out{.samples = {}, .clip = *clip, .traces = code_traces(raw, executor)};
   add_filter_trace(blocks, out.traces);
   out.samples = std::move(blocks);
   if (options.method == PictureNoiseMethod::foi) {

@@ -23,6 +23,11 @@ Result<PictureNoise> fit(const RawDn& raw, double black_dn, const PictureNoiseOp
   return fit_picture_noise(raw, {black_dn, black_dn, black_dn, black_dn}, options, executor);
 }
 
+RawTraces traces_of(const RawDn& raw) {
+  PoolExecutor executor(2);
+  return code_traces(raw, executor);
+}
+
 /// Sixteen steps of light in both directions (not in step with blocks of 8) with normal noise of a line, filtered by
 /// `filter` before it is added.
 RawDn stairs(int side, double gain, double offset_dn2, double black_dn,
@@ -145,30 +150,69 @@ TEST(PictureNoise, TellsFilteredNoise) {
 
 TEST(CodeTraces, TellTheStepOfTheCodes) {
   const RawDn raw = stairs(1024, 0.8, 6, 100, white_noise);
-  EXPECT_EQ(code_traces(raw).code_step_dn, 1);
+  EXPECT_EQ(traces_of(raw).code_step_dn, 1);
   RawDn coarse = stairs(1024, 0.8, 6, 100, white_noise);
   for (std::size_t i = 0; i < coarse.dn.size(); ++i) coarse.dn.data()[i] &= 0xfffc;
-  const RawTraces traces = code_traces(coarse);
+  const RawTraces traces = traces_of(coarse);
   EXPECT_EQ(traces.code_step_dn, 4);
   EXPECT_FALSE(traces.companded);
 }
 
 TEST(CodeTraces, TellStepsThatGrow) {
   RawDn raw = stairs(1024, 0.8, 6, 100, white_noise);
-  EXPECT_FALSE(code_traces(raw).companded);
+  EXPECT_FALSE(traces_of(raw).companded);
   for (std::size_t i = 0; i < raw.dn.size(); ++i) {
     std::uint16_t& code = raw.dn.data()[i];
     if (code >= 256) code &= 0xfffc;
   }
-  const RawTraces traces = code_traces(raw);
+  const RawTraces traces = traces_of(raw);
   EXPECT_TRUE(traces.companded);
   EXPECT_EQ(traces.code_step_dn, 1);
   EXPECT_EQ(traces.largest_step_dn, 4);
 }
 
+/// Returns grid_excess by its definition, pixel by pixel.
+double plain_grid_excess(const RawDn& raw) {
+  double out = 0;
+  for (const bool across_columns : {true, false}) {
+    std::vector<double> sum(8), n(8);
+    const int dx = across_columns ? 2 : 0, dy = 2 - dx;
+    for (int y = 2 * dy; y < raw.active.height - dy; ++y) {
+      for (int x = 2 * dx; x < raw.active.width - dx; ++x) {
+        const auto at = [&](int i) -> int { return raw.dn.at(raw.active.x + x + i * dx, raw.active.y + y + i * dy); };
+        const int phase = (across_columns ? x : y) / 2 % 8;
+        sum[phase] += std::abs(at(-2) - 3 * at(-1) + 3 * at(0) - at(1));
+        n[phase] += 1;
+      }
+    }
+    for (int p = 0; p < 8; ++p) sum[p] /= std::max(n[p], 1.0);
+    std::sort(sum.begin(), sum.end());
+    if (sum[2] > 0 && sum[7] - sum[2] > 3 * (sum[4] - sum[0])) out = std::max(out, sum[7] / sum[2] - 1);
+  }
+  return out;
+}
+
+TEST(CodeTraces, GridExcessIsThatOfItsDefinitionAtEverySize) {
+  std::mt19937 engine(1);
+  std::uniform_real_distribution<double> log_side(std::log(1.0), std::log(300.0));
+  int with_excess = 0;
+  for (int i = 0; i < 200; ++i) {
+    const int width = static_cast<int>(std::exp(log_side(engine))),
+              height = static_cast<int>(std::exp(log_side(engine)));
+    RawDn raw = test::bayer_frame(width + 3, height + 2, BayerPhase::rggb, [&](int x, int y) {
+      return static_cast<int>(engine() % (i % 2 == 0 ? 65536 : 16)) / 2 + 9000 * ((x / 16 + y / 16) % 2);
+    });
+    raw.active = {3, 2, width, height};
+    const double expected = plain_grid_excess(raw);
+    EXPECT_EQ(traces_of(raw).grid_excess, expected) << width << " x " << height;
+    with_excess += expected > 0 ? 1 : 0;
+  }
+  EXPECT_GT(with_excess, 20);
+}
+
 TEST(CodeTraces, TellTheGridOfBlocks) {
   RawDn raw = stairs(1024, 0.8, 6, 100, white_noise);
-  EXPECT_FALSE(code_traces(raw).block_grid);
+  EXPECT_FALSE(traces_of(raw).block_grid);
   test::NormalDn level(9);
   std::vector<int> of(128 * 128);
   for (int& v : of) v = level(60, 15);
@@ -177,7 +221,7 @@ TEST(CodeTraces, TellTheGridOfBlocks) {
       raw.dn.at(x, y) = static_cast<std::uint16_t>(raw.dn.at(x, y) + of[y / 16 * 128 + x / 16]);
     }
   }
-  const RawTraces traces = code_traces(raw);
+  const RawTraces traces = traces_of(raw);
   EXPECT_TRUE(traces.block_grid) << traces.grid_excess;
 }
 
@@ -214,7 +258,7 @@ TEST(CompareWith, PutsTheProfileInOurUnits) {
 TEST(CodeTracesOfRealRaws, FindTheStepOfFourInTheOpenIspRaw) {
   const auto frame = capture::read_raw(LOWLUX_TESTDATA "/raws/openisp_test_rggb10.dng");
   ASSERT_TRUE(frame) << frame.error().message;
-  EXPECT_EQ(code_traces(frame->raw).code_step_dn, 4);
+  EXPECT_EQ(traces_of(frame->raw).code_step_dn, 4);
 }
 
 }  // namespace
