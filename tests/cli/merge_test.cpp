@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -131,6 +132,28 @@ TEST_F(MergeCommand, ABudgetChoosesWhatIsOpenAndSaysWhy) {
   EXPECT_EQ(Json::parse(fixed.out)["budget"]["mean"], "robust");
   EXPECT_EQ(Json::parse(fixed.out)["alignment"], "cells");
   EXPECT_EQ(merge(frames_, {"--budget-ms", "soon", "--force"}).exit_code, 2);
+}
+
+// Dark frames leave hot pixels without a value, and so cells in which a colour has none.
+TEST_F(MergeCommand, TheNoiseOfABracketIsThatOfSitesWithValues) {
+  const std::string scene = std::string(LOWLUX_TESTDATA) + "/pictures/kodim23.png";
+  std::array<NoiseProfile, 2> noise;
+  for (const bool hot : {false, true}) {
+    std::vector<std::string> more{"--bracket", "0,-1,-2", "--luminance", "1", "--exposure", "0.1",
+                                  "--gain",    "1600",    "--seed",      "3", "--no-truth", "--force"};
+    if (hot) more.insert(more.end(), {"--hot-pixels", "0.0002", "--hot-current", "3000"});
+    simulated(scene, "bracket.dng", more);
+    const auto result =
+        merge({file("bracket_0000.dng"), file("bracket_0001.dng"), file("bracket_0002.dng")}, {"--force"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const auto merged = capture::read_raw(file("merged.dng"));
+    ASSERT_TRUE(merged && merged->noise);
+    noise[hot ? 1 : 0] = *merged->noise;
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_NEAR(noise[1].scale[c] / noise[0].scale[c], 1, 0.05) << c;
+    EXPECT_NEAR(noise[1].offset[c] / noise[0].offset[c], 1, 0.2) << c;
+  }
 }
 
 TEST_F(MergeCommand, ABudgetOfDevelopIsForMergingToo) {

@@ -92,11 +92,16 @@ NoiseProfile residual_profile(const SignalElectronsView& signal_e, const std::ar
       const int x = 2 * cell_x + (site & 1), y = 2 * cell_y + (site >> 1);
       const auto colour = static_cast<std::size_t>(colour_at(signal_e.phase, x, y));
       const double unit = 1 / light_e[site];
-      const double variance = site_variance_e2[colour].at(cell_x, cell_y) * unit * unit + added;
-      if (variance > 0) samples[colour].push_back({std::max(0.0, signal_e.value.at(x, y) * unit), variance});
+      const float variance_e2 = site_variance_e2[colour].at(cell_x, cell_y);
+      if (!(variance_e2 > 0)) continue;
+      samples[colour].push_back({std::max(0.0, signal_e.value.at(x, y) * unit), variance_e2 * unit * unit + added});
     }
   }
-  return profile_of(samples, fit);
+  NoiseProfile out = profile_of(samples, fit);
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (samples[c].empty()) out.offset[c] = added;
+  }
+  return out;
 }
 
 NoiseProfile residual_profile(std::span<const Plane<float>> planes, const NoiseMaps& maps,

@@ -99,19 +99,19 @@ NoiseProfile profile_of_mean(const FrameElectrons& reference, const MergedRaw& m
   return out;
 }
 
-/// Returns the variance of a site of R, G and B in each 2x2 cell of a bracket [e-^2].
+/// Returns the variance of a site of R, G and B in each 2x2 cell of a bracket [e-^2]; 0 for a colour without a value at
+/// one of its sites.
 std::array<Plane<float>, 3> site_variance(const Plane<float>& weight, BayerPhase phase, Executor& executor) {
   const int columns = weight.width() / 2, rows = weight.height() / 2;
   std::array<Plane<float>, 3> out{Plane<float>(columns, rows), {columns, rows}, {columns, rows}};
   for_each_index(executor, rows, [&](int y) {
     for (int x = 0; x < columns; ++x) {
-      std::array<float, 3> sum{};
+      std::array<double, 3> sum{};
       for (int site = 0; site < 4; ++site) {
         const std::size_t colour = colour_of(phase, site);
-        sum[colour] += (colour == 1 ? 0.5F : 1.0F) *
-                       static_cast<float>(variance_at(weight, 2 * x + (site & 1), 2 * y + (site >> 1), 0));
+        sum[colour] += (colour == 1 ? 0.5 : 1) * variance_at(weight, 2 * x + (site & 1), 2 * y + (site >> 1), INFINITY);
       }
-      for (std::size_t c = 0; c < 3; ++c) out[c].at(x, y) = weight.at(2 * x, 2 * y) > 0 ? sum[c] : 0;
+      for (std::size_t c = 0; c < 3; ++c) out[c].at(x, y) = std::isfinite(sum[c]) ? static_cast<float>(sum[c]) : 0;
     }
   });
   return out;
