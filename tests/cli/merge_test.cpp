@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/file/dng_source.h"
+#include "capture/file/picture_source.h"
 #include "isp/raw/black_point.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate/simulate_command.h"
@@ -132,6 +133,51 @@ TEST_F(MergeCommand, ABudgetChoosesWhatIsOpenAndSaysWhy) {
   EXPECT_EQ(Json::parse(fixed.out)["budget"]["mean"], "robust");
   EXPECT_EQ(Json::parse(fixed.out)["alignment"], "cells");
   EXPECT_EQ(merge(frames_, {"--budget-ms", "soon", "--force"}).exit_code, 2);
+}
+
+// Frames are merged whole and as camera RGB, whatever the image is to be.
+TEST_F(MergeCommand, OptionsOfTheImageDoNotChangeHowFramesAreMerged) {
+  simulated(std::string(LOWLUX_TESTDATA) + "/pictures/kodim19.png", "hand.dng",
+            {"--luminance", "0.1", "--frames", "4", "--shake", "8", "--seed", "2", "--no-truth"});
+  std::vector<std::string> develop{"develop", "--merge", "--force", "--json"};
+  for (int i = 0; i < 4; ++i) develop.push_back(file("hand_000" + std::to_string(i) + ".dng"));
+  const auto developed = [&](const std::string& output, const std::vector<std::string>& more) {
+    std::vector<std::string> args = develop;
+    args.insert(args.end(), {"-o", file(output)});
+    args.insert(args.end(), more.begin(), more.end());
+    const auto result = lowlux(args);
+    EXPECT_EQ(result.exit_code, 0) << testing::PrintToString(more) << result.err;
+    return result.exit_code == 0 ? Json::parse(result.out)[0]["merge"]["mean_count"].get<double>() : 0;
+  };
+  const double count = developed("whole.png", {"--exposure", "4"});
+  EXPECT_GT(count, 2.5);
+  const std::vector<std::vector<std::string>> changes{{"--crop", "51,50,203,151"},
+                                                      {"--max-size", "100"},
+                                                      {"--saturation", "1.2"},
+                                                      {"--brightness", "0.5"},
+                                                      {"--contrast", "1.2"},
+                                                      {"--sharpen", "1.5"},
+                                                      {"--highlights", "reconstruct"},
+                                                      {"--half"},
+                                                      {"--local-tone", "0.5"},
+                                                      {"--wb", "5000"},
+                                                      {"--look", "eye", "--light", "HPS_generic"}};
+  for (const std::vector<std::string>& change : changes) {
+    EXPECT_EQ(developed("other.png", change), count) << testing::PrintToString(change);
+  }
+  developed("crop.png", {"--exposure", "4", "--crop", "51,50,203,151"});
+  InlineExecutor executor;
+  const auto whole = capture::read_picture(file("whole.png"), executor);
+  const auto crop = capture::read_picture(file("crop.png"), executor);
+  ASSERT_TRUE(whole && crop);
+  ASSERT_EQ(crop->xyz.width(), 203);
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (int y = 0; y < 151; ++y) {
+      for (int x = 0; x < 203; ++x) {
+        ASSERT_EQ(crop->xyz.plane[c].at(x, y), whole->xyz.plane[c].at(51 + x, 50 + y)) << x << ' ' << y;
+      }
+    }
+  }
 }
 
 // Dark frames leave hot pixels without a value, and so cells in which a colour has none.

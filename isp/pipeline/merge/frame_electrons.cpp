@@ -35,19 +35,21 @@ void describe_noise(const RawFrame& frame, const DevelopPlan& plan, FrameElectro
 
 }  // namespace
 
-DevelopOptions without_rendering(DevelopOptions options, denoise::Level level) {
-  options.space = OutputSpace::camera;
-  options.samples = SampleType::f32;
-  options.tone = ToneCurve::none;
-  options.exposure_ev = 0;
-  options.half = false;
-  options.look = {};
-  options.display = nullptr;
-  options.effects.reset();
-  options.denoise.mode = DenoiseChoice::Mode::level;
-  options.denoise.level = level;
-  options.denoise.maps = false;
-  return options;
+DevelopOptions options_of_signal(const DevelopOptions& options, denoise::Level level) {
+  DevelopOptions out{.exposure_ev = 0,
+                     .tone = ToneCurve::none,
+                     .space = OutputSpace::camera,
+                     .samples = SampleType::f32,
+                     .demosaic = options.demosaic,
+                     .black = options.black,
+                     .estimate_dark = options.estimate_dark,
+                     .find_defects = options.find_defects,
+                     .dark_frame = options.dark_frame,
+                     .denoise = options.denoise};
+  out.denoise.mode = DenoiseChoice::Mode::level;
+  out.denoise.level = level;
+  out.denoise.maps = false;
+  return out;
 }
 
 Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
@@ -58,7 +60,7 @@ Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptio
                     : "the frame is already demosaiced: frames are aligned and averaged by the sites of their mosaic");
   }
   RawElectrons charge;
-  Result<DevelopPlan> plan = plan_develop(frame, without_rendering(options, denoise::Level::draft), executor, &charge);
+  Result<DevelopPlan> plan = plan_develop(frame, options_of_signal(options, denoise::Level::draft), executor, &charge);
   if (!plan) return tl::make_unexpected(std::move(plan.error()));
   FrameElectrons out{.phase = frame.raw.phase, .warnings = std::move(plan->warnings)};
   describe_noise(frame, *plan, out);

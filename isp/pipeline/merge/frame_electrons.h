@@ -30,9 +30,9 @@ inline merge::FrameView view_of(const FrameElectrons& frame) {
   return {frame.signal_e.view(), frame.phase, frame.variance_e2};
 }
 
-/// Returns options under which a frame is developed to camera RGB at a level, without look, tone and exposure. The
-/// options of black level, dark frame, defects and line noise stay.
-DevelopOptions without_rendering(DevelopOptions options, denoise::Level level);
+/// Returns options under which a whole frame is developed to camera RGB at a level. Of `options`, those of black level,
+/// dark charge, defects, line noise and interpolation are kept; those of the image, such as its crop, are not.
+DevelopOptions options_of_signal(const DevelopOptions& options, denoise::Level level);
 
 /// Measures a frame as plan_develop does and converts it. The options that matter are those of black level, dark frame,
 /// defects and line noise. Errors: those of plan_develop; unknown noise (insufficient), three colours in each pixel

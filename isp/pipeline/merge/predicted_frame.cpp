@@ -37,7 +37,7 @@ Result<CameraRgb> predicted(RawFrame& frame, const DevelopOptions& options, cons
   };
   RawElectrons charge;
   Result<DevelopPlan> plan =
-      plan_develop(whole, without_rendering(options, denoise::Level::standard), executor, &charge);
+      plan_develop(whole, options_of_signal(options, denoise::Level::standard), executor, &charge);
   if (!plan) {
     give_back();
     return tl::make_unexpected(std::move(plan.error()));
