@@ -81,7 +81,10 @@ struct DevelopOptions {
   std::optional<PictureCrop> crop;
   std::optional<int> max_size;  // length of the longer side [px], 1 or more; larger images are shrunk in linear light
   BlackRequest black;
-  bool estimate_dark = true;                    // dark charge that is not known is estimated from the frame itself
+  bool estimate_dark = true;  // dark charge that is not known is estimated from the frame itself
+  /// States the dark charge [e-] of each site that another frame of the same series shows: used where the frame itself
+  /// would be examined for it. Estimates of single frames scatter, and one that changes makes frames differ.
+  std::optional<PerSite<double>> series_dark_e;
   bool find_defects = true;                     // search for hot and dead pixels in addition to those the source lists
   std::shared_ptr<const DarkFrame> dark_frame;  // set: subtracted pixel by pixel instead of `black`
   DenoiseChoice denoise;

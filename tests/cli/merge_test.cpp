@@ -137,8 +137,8 @@ TEST_F(MergeCommand, ABudgetChoosesWhatIsOpenAndSaysWhy) {
 
 // Frames are merged whole and as camera RGB, whatever the image is to be.
 TEST_F(MergeCommand, OptionsOfTheImageDoNotChangeHowFramesAreMerged) {
-  simulated(std::string(LOWLUX_TESTDATA) + "/pictures/kodim19.png", "hand.dng",
-            {"--luminance", "0.1", "--frames", "4", "--shake", "8", "--seed", "2", "--no-truth"});
+  simulated("chart:macbeth", "hand.dng",
+            {"--size", "288x216", "--luminance", "0.1", "--frames", "4", "--shake", "8", "--seed", "2", "--no-truth"});
   std::vector<std::string> develop{"develop", "--merge", "--force", "--json"};
   for (int i = 0; i < 4; ++i) develop.push_back(file("hand_000" + std::to_string(i) + ".dng"));
   const auto developed = [&](const std::string& output, const std::vector<std::string>& more) {
@@ -177,6 +177,22 @@ TEST_F(MergeCommand, OptionsOfTheImageDoNotChangeHowFramesAreMerged) {
         ASSERT_EQ(crop->xyz.plane[c].at(x, y), whole->xyz.plane[c].at(51 + x, 50 + y)) << x << ' ' << y;
       }
     }
+  }
+}
+
+// Estimates from single frames scatter: by chance some show the dark charge significantly, and others do not.
+TEST_F(MergeCommand, DarkChargeThatIsEstimatedIsDecidedOnceForAllFrames) {
+  for (const char* const temperature : {"26", "30"}) {
+    simulated(std::string(LOWLUX_TESTDATA) + "/pictures/kodim23.png", "still.dng",
+              {"--luminance", "0.1", "--exposure", "1", "--gain", "1600", "--dark-current", "6", "--temperature",
+               temperature, "--frames", "6", "--seed", "1", "--no-truth", "--force"});
+    std::vector<std::string> frames;
+    for (int i = 0; i < 6; ++i) frames.push_back(file("still_000" + std::to_string(i) + ".dng"));
+    const auto result = merge(frames, {"--json", "--force"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const Json report = Json::parse(result.out);
+    EXPECT_EQ(report["alignment"], "none") << temperature;
+    EXPECT_NEAR(report["mean_count"], 6, 0.1) << temperature;
   }
 }
 

@@ -103,6 +103,31 @@ TEST(UnknownDark, IsEstimatedAndSubtractedWhereTheFrameShowsIt) {
   EXPECT_NEAR(*plan.dark.alpha, (60 + 120 + 80.0) / (60 + 120 + 80 + 600), 0.02);
 }
 
+TEST(UnknownDark, OfASeriesIsThatOfItsOtherFrames) {
+  const RawFrame frame = ramp_over_dark(200, 40, 1);
+  DevelopOptions options = without_estimate();
+  options.series_dark_e = {180, 185, 190, 195};
+  const DevelopPlan plan = planned(frame, options);
+  EXPECT_EQ(plan.dark.state, DarkCharge::State::estimated);
+  EXPECT_EQ(plan.levels.black.dark_mean_e, *options.series_dark_e);
+  EXPECT_NEAR(*plan.dark.mean_e, 187.5, 1e-9);
+  EXPECT_FALSE(warns(plan));
+  const RawFrame brief = ramp_over_dark(0, 40, 0.001);
+  EXPECT_EQ(planned(brief, options).dark.state, DarkCharge::State::not_expected);
+}
+
+TEST(UnknownDark, GrowsWithTimeAndDoublesEverySevenKelvin) {
+  FrameInfo one, other;
+  one.exposure_s = 4;
+  other.exposure_s = 0.5;
+  EXPECT_EQ(dark_charge_ratio(one, other), 8);
+  one.temperature_c = 32;
+  EXPECT_EQ(dark_charge_ratio(one, other), 8);
+  other.temperature_c = 25;
+  EXPECT_DOUBLE_EQ(dark_charge_ratio(one, other), 16);
+  EXPECT_DOUBLE_EQ(dark_charge_ratio(other, one), 1.0 / 16);
+}
+
 /// Returns R, G and B in the middle of a saturated square of a ramp over dark charge, exposed as it is.
 std::array<double, 3> saturated_colour(double dark_e, const DenoiseChoice& denoise, bool half) {
   constexpr int side = 64;

@@ -43,6 +43,7 @@ DevelopOptions options_of_signal(const DevelopOptions& options, denoise::Level l
                      .demosaic = options.demosaic,
                      .black = options.black,
                      .estimate_dark = options.estimate_dark,
+                     .series_dark_e = options.series_dark_e,
                      .find_defects = options.find_defects,
                      .dark_frame = options.dark_frame,
                      .denoise = options.denoise};
@@ -62,7 +63,9 @@ Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptio
   RawElectrons charge;
   Result<DevelopPlan> plan = plan_develop(frame, options_of_signal(options, denoise::Level::draft), executor, &charge);
   if (!plan) return tl::make_unexpected(std::move(plan.error()));
-  FrameElectrons out{.phase = frame.raw.phase, .warnings = std::move(plan->warnings)};
+  FrameElectrons out{.phase = frame.raw.phase,
+                     .dark_is_estimated = plan->dark.state == DarkCharge::State::estimated,
+                     .warnings = std::move(plan->warnings)};
   describe_noise(frame, *plan, out);
   const std::vector<Pixel> defects = std::exchange(plan->levels.defects, {});
   if (charge.value.empty()) charge = raw_electrons(frame, plan->levels, executor);

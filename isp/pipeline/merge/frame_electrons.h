@@ -20,6 +20,7 @@ struct FrameElectrons {
   BayerPhase phase = BayerPhase::rggb;
   PerSite<double> variance_e2{};         // without light: read noise, dark charge, quantisation
   PerSite<double> dark_charge_e{};       // mean that was subtracted; 0 if unknown
+  bool dark_is_estimated = false;        // that mean was estimated from the frame itself
   PerSite<double> common_variance_e2{};  // of the subtracted dark frame, which frames of one exposure share
   std::array<double, 3> saturation_e{};  // signal from which on a site of R, G, B is saturated
   PerSite<double> light_at_white_e{};

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "isp/base/camera_profile.h"
+#include "isp/pipeline/plan/dark_charge.h"
 #include "isp/pipeline/plan/plan_develop.h"
 
 namespace lowlux::isp {
@@ -86,11 +87,14 @@ Result<FrameElectrons> FrameLoader::read_reference(int index) {
   if (!electrons) return tl::make_unexpected(at_frame(electrons.error(), frame->name));
   clock_.lap("black and noise");
   reference_ = *std::move(frame);
+  dark_.reset();
+  if (electrons->dark_is_estimated) dark_ = SeriesDark{electrons->dark_charge_e, reference_.frame.raw.info, true};
   return electrons;
 }
 
 void FrameLoader::expect(std::vector<int> order) {
   if (next_.valid()) next_.wait();
+  if (dark_ && !dark_->is_of_reference) dark_.reset();
   order_ = std::move(order);
   position_ = 0;
   begin();
@@ -130,10 +134,24 @@ Result<FrameElectrons> FrameLoader::next() {
     }
     frame.noise = *std::move(expected);  // a profile that is measured in an image has an error of its own
   }
-  Result<FrameElectrons> electrons = frame_electrons(frame, read->options, executor_);
+  Result<FrameElectrons> electrons = electrons_of(*read);
   if (!electrons) return tl::make_unexpected(at_frame(electrons.error(), last_name_));
   clock_.lap("black and noise");
   return electrons;
+}
+
+Result<FrameElectrons> FrameLoader::electrons_of(const FrameToMerge& read) {
+  DevelopOptions options = read.options;
+  const bool is_like_reference = !differ(reference_.frame.raw.info.exposure_s, last_.exposure_s);
+  if (options.estimate_dark && is_like_reference && !(dark_ && dark_->is_of_reference)) options.estimate_dark = false;
+  if (options.estimate_dark && dark_ && last_.exposure_s) {
+    const double ratio = dark_charge_ratio(last_, dark_->info);
+    PerSite<double>& charge_e = options.series_dark_e.emplace(dark_->charge_e);
+    for (double& charge : charge_e) charge *= ratio;
+  }
+  Result<FrameElectrons> out = frame_electrons(read.frame, options, executor_);
+  if (out && out->dark_is_estimated && !dark_) dark_ = SeriesDark{out->dark_charge_e, last_, false};
+  return out;
 }
 
 Result<double> FrameLoader::stated_light() const {

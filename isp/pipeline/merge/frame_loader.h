@@ -1,6 +1,7 @@
 #pragma once
 
 #include <future>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -47,6 +48,8 @@ class FrameLoader {
 
  private:
   void begin();
+  /// Converts the frame that was read last, with the dark charge of the series.
+  Result<FrameElectrons> electrons_of(const FrameToMerge& read);
 
   const FrameReader& read_;
   Executor& executor_;
@@ -55,6 +58,14 @@ class FrameLoader {
   FrameInfo last_;  // of the frame that was read last
   std::string last_name_;
   bool exposures_differ_ = false;
+  /// Holds the dark charge that the reference shows, or, if it shows none, the first frame of another exposure that
+  /// does: one decision for all, since frames that differ by dark charge would not match.
+  struct SeriesDark {
+    PerSite<double> charge_e{};
+    FrameInfo info;
+    bool is_of_reference = false;
+  };
+  std::optional<SeriesDark> dark_;
   std::vector<int> order_;
   std::size_t position_ = 0;
   std::future<Result<FrameToMerge>> next_;

@@ -133,7 +133,7 @@ double median_of(const Plane<float>& plane) {
 }  // namespace
 
 DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, const Thumbnail& thumbnail,
-                            bool may_estimate) {
+                            const DevelopOptions& options) {
   const FrameInfo& info = frame.raw.info;
   if (frame.raw.layout != SensorLayout::bayer) return {.reason = "not a mosaic of filters"};
   const bool is_known = levels.black.dark_mean_e != PerSite<double>{};
@@ -147,7 +147,14 @@ DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, cons
     out.reason = "the exposure was short, or the sensor cold";
     return out;
   }
-  if (may_estimate) {
+  if (options.series_dark_e) {
+    out.state = DarkCharge::State::estimated;
+    out.charge_e = out.estimated_e = *options.series_dark_e;
+    out.mean_e = mean_of_sites(out.charge_e);
+    out.reason = "as another frame of the series shows";
+    return out;
+  }
+  if (options.estimate_dark) {
     const std::optional<DarkEstimate> found = estimate(frame, levels, thumbnail);
     if (found && found->is_significant() && found->mean_e <= charge_of(max_current_e_per_s, info)) {
       use(*found, frame.raw, out);
@@ -159,6 +166,12 @@ DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, cons
   }
   out.max_fraction = max_dark_fraction(frame, levels, thumbnail);
   if (out.max_fraction) out.state = DarkCharge::State::unknown;
+  return out;
+}
+
+double dark_charge_ratio(const FrameInfo& of, const FrameInfo& to) {
+  double out = *of.exposure_s / *to.exposure_s;
+  if (of.temperature_c && to.temperature_c) out *= std::exp2((*of.temperature_c - *to.temperature_c) / doubling_c);
   return out;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "isp/base/frame.h"
+#include "isp/pipeline/options.h"
 #include "isp/pipeline/plan/levels.h"
 #include "isp/pipeline/plan/rendering.h"
 #include "isp/raw/measure/thumbnail.h"
@@ -32,12 +33,16 @@ struct DarkCharge {
 };
 
 /// Finds the dark charge of a frame. Where the black point holds only a pedestal, the gain is known and the exposure
-/// was long, it is estimated from the frame itself (estimate_dark_charge), if `may_estimate`. A significant estimate
-/// must also be within 1000 e-/s at 25 C, doubling every 7 C: three times the highest dark current of the sensors in
-/// isp/model/data/sensors.csv.
+/// was long, it is estimated from the frame itself (estimate_dark_charge), if `options.estimate_dark`, or
+/// `options.series_dark_e` is used. A significant estimate must also be within 1000 e-/s at 25 C, doubling every 7 C:
+/// three times the highest dark current of the sensors in isp/model/data/sensors.csv.
 /// @param thumbnail  dark charge included
 DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, const Thumbnail& thumbnail,
-                            bool may_estimate);
+                            const DevelopOptions& options);
+
+/// Returns the ratio of the dark charge of one frame to that of another of the same sensor, by exposure times and,
+/// where both are stated, temperatures (doubling every 7 C). Precondition: both state their exposure times.
+double dark_charge_ratio(const FrameInfo& of, const FrameInfo& to);
 
 /// Returns the warning of State::unknown; empty in other states.
 std::string warning_of(const DarkCharge& dark, const FrameInfo& info);

@@ -147,7 +147,7 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   const Thumbnail thumbnail = make_thumbnail(measured, levels->black, executor);
   clock.lap("thumbnail");
 
-  plan.dark = find_dark_charge(frame, *levels, thumbnail, options.estimate_dark);
+  plan.dark = find_dark_charge(frame, *levels, thumbnail, options);
   if (plan.dark.state == DarkCharge::State::estimated) levels->black.dark_mean_e = plan.dark.estimated_e;
   if (plan.dark.state == DarkCharge::State::unknown) plan.warnings.push_back(warning_of(plan.dark, frame.raw.info));
   FoundDefects found = all_defects(frame, measured.raw, thumbnail, *levels, options.find_defects, executor);
