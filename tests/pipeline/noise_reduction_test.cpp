@@ -237,6 +237,20 @@ TEST(NoiseReduction, RowNoiseIsTakenOffWhereItStandsOut) {
   EXPECT_TRUE(planned(with_row_noise(1), {.mode = Mode::level, .line_noise = false}).noise_reduction.lines.empty());
 }
 
+// Rows that differ by more than the read noise may be a blind of the scene.
+TEST(NoiseReduction, RowsThatDifferByMoreThanTheReadNoiseStayWithAWarning) {
+  const auto warns = [](double std_e) {
+    const DevelopPlan plan = planned(with_row_noise(std_e), {.mode = Mode::level});
+    return std::ranges::any_of(plan.warnings, [](const std::string& warning) {
+      return warning.starts_with("rows differ by ") && warning.find("is left in") != std::string::npos;
+    });
+  };
+  EXPECT_FALSE(warns(0));
+  EXPECT_FALSE(warns(1));
+  EXPECT_TRUE(warns(4));
+  EXPECT_TRUE(planned(with_row_noise(4), {.mode = Mode::level}).noise_reduction.lines.empty());
+}
+
 TEST(NoiseReduction, MapsAreThoseOfTheActiveAreaIfAskedFor) {
   RawFrame frame = test::night_frame({}, grey(20), 97, 63);
   frame.raw.default_crop = {8, 8, 64, 32};

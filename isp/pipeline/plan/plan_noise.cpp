@@ -6,7 +6,9 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -68,11 +70,30 @@ double black_std_e(const denoise::RawNoise& noise) {
   return std::sqrt(noise.dark_mean_e[0] + (v[0] + 2 * v[1] + v[2]) / 4);
 }
 
+constexpr double min_strong_lines = 0.5;  // of the noise of the median pixel
+
 /// Returns the least visible standard deviation of line noise: the eye integrates it along lines.
 double min_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_std_e(noise); }
 
-std::vector<denoise::LineOffsets> lines_of(const denoise::RawNoise& noise, PlaneView<const float> charge_e,
-                                           Executor& executor) {
+/// Returns the standard deviation of a pixel whose signal-to-noise ratio is `snr`: s^2 = snr s + v.
+double pixel_std_e(const denoise::RawNoise& noise, double snr) {
+  return 0.5 * (snr + std::hypot(snr, 2 * black_std_e(noise)));
+}
+
+/// Returns the warning of lines that are too strong to be taken for noise, where they stand out of that of the median
+/// pixel; empty for others.
+std::string warning_of_strong_lines(const denoise::LineOffsets& found, const denoise::RawNoise& noise, double snr) {
+  if (found.gain < 0.5 || found.line_std_e < black_std_e(noise)) return {};
+  if (found.line_std_e < min_strong_lines * pixel_std_e(noise, snr)) return {};
+  return fmt::format(
+      "{} differ by {:.3g} e-, which is more than the read noise, so that it may be a fence or a blind of the scene: "
+      "it "
+      "is left in; if the camera makes it, --dark-frame removes what is the same in every frame",
+      found.lines == denoise::Lines::rows ? "rows" : "columns", found.line_std_e);
+}
+
+std::vector<denoise::LineOffsets> lines_of(const denoise::RawNoise& noise, double snr, PlaneView<const float> charge_e,
+                                           std::vector<std::string>& warnings, Executor& executor) {
   const denoise::FrameLineOptions options{.min_std_e = min_line_std_e(noise)};
   std::array<std::optional<denoise::LineOffsets>, 2> of_kind;
   for_each_index(executor, 2, [&](int kind) {
@@ -81,14 +102,18 @@ std::vector<denoise::LineOffsets> lines_of(const denoise::RawNoise& noise, Plane
   });
   std::vector<denoise::LineOffsets> lines;
   for (auto& found : of_kind) {
-    if (found && lines_stand_out(*found, noise)) lines.push_back(*std::move(found));
+    if (!found) continue;
+    std::string warning = warning_of_strong_lines(*found, noise, snr);
+    if (!warning.empty()) warnings.push_back(std::move(warning));
+    if (lines_stand_out(*found, noise)) lines.push_back(*std::move(found));
   }
   return lines;
 }
 
 /// Subtracts line noise, and its contribution to the variance of a pixel.
 void subtract_measured_lines(const RawFrame& frame, RawElectrons& charge, NoiseReduction& out, Executor& executor) {
-  out.lines = lines_of(median_noise(frame, out.noise), charge.value.view(), executor);
+  out.lines =
+      lines_of(median_noise(frame, out.noise), out.snr.value_or(0), charge.value.view(), out.warnings, executor);
   for (const denoise::LineOffsets& lines : out.lines) {
     subtract_lines(lines, charge.value.view());
     const double gone_e2 = lines.line_std_e * lines.line_std_e - lines.residual_std_e * lines.residual_std_e;
