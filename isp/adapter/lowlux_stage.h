@@ -202,7 +202,7 @@ typedef struct {
   float sharpness;        /* accepted, without effect */
   float exposure_ev;      /* gain 2^EV of the image, -10..20; if not valid: automatic */
   float noise_gain;       /* DN per electron, at this frame's gain; requires noise_read */
-  float noise_read;       /* standard deviation of a pixel without light [DN] */
+  float noise_read;       /* standard deviation of a pixel without light, before it is rounded to a code [DN] */
   float f_number;
   double scene_luminance_cd_m2; /* mean luminance over the image */
   float budget_ms;              /* time limit for this frame, 0.01..1e6; steps that do not fit are left out */
@@ -274,7 +274,7 @@ typedef struct {
   int32_t white_from;   /* source of the white balance */
   float black_level[4]; /* R, Gr, Gb, B that was subtracted, including dark charge */
   float noise_gain;     /* DN per electron; 0: not known */
-  float noise_read;     /* standard deviation of a pixel without light [DN] */
+  float noise_read;     /* standard deviation of a pixel without light, rounded to a code [DN] */
   float colour_gains[2];
   float exposure_ev;
   int32_t level;               /* LOWLUX_STAGE_LEVEL_... of noise reduction */
@@ -307,7 +307,7 @@ typedef struct {
   float measured_black[4];       /* R, Gr, Gb, B: on masked pixels, else on the darkest hundredth of the image */
   int32_t measured_black_masked; /* 1: measured on masked pixels */
   float measured_noise_gain;     /* DN per electron, measured on this frame; 0: not measurable */
-  float measured_noise_read;     /* standard deviation of a pixel without light [DN]; 0: not measurable */
+  float measured_noise_read;     /* standard deviation of a pixel without light, rounded [DN]; 0: not measurable */
 } lowlux_stage_statistics;
 
 LOWLUX_STAGE_EXPORT uint32_t lowlux_stage_version(void);

@@ -253,6 +253,33 @@ TEST(StageParams, OfColourMatrixAndSaturationActOnBalancedColours) {
   }
 }
 
+TEST(StageParams, TheMatrixOfAFrameGivesTheLookOfTheEyeItsColours) {
+  const RawFormatNames& names = names_of_bayer(12);
+  const Codes codes = scene(names.format, width, height);
+  // Returns the mean distance of red from green [codes]: without gains of white balance the scene is green.
+  const auto distance = [&](std::int32_t look, bool matrix) {
+    auto settings = plain_settings();
+    settings.look = look;
+    Rig rig(settings, names, width, height, LOWLUX_STAGE_BGR888);
+    auto params = fixed_params(names.format);
+    params.valid |= LOWLUX_STAGE_HAS_COLOUR_GAINS | LOWLUX_STAGE_HAS_SCENE_LUMINANCE;
+    if (matrix) params.valid |= LOWLUX_STAGE_HAS_COLOUR_MATRIX;
+    params.colour_gains[0] = params.colour_gains[1] = 1;
+    for (int i = 0; i < 9; ++i) params.colour_matrix[i] = i % 4 == 0 ? 1.0F : 0.0F;
+    params.scene_luminance_cd_m2 = 0.001F;
+    EXPECT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK) << rig.error();
+    EXPECT_EQ((rig.result.applied & LOWLUX_STAGE_HAS_COLOUR_MATRIX) != 0, matrix);
+    double sum = 0;
+    const auto& bgr = rig.planes[0];
+    for (std::size_t i = 0; i < bgr.size(); i += 3) sum += static_cast<double>(bgr[i + 1]) - bgr[i + 2];
+    return sum / (width * height);
+  };
+  const double camera = distance(LOWLUX_STAGE_LOOK_CAMERA, true);
+  EXPECT_GT(camera, 10);
+  EXPECT_NEAR(distance(LOWLUX_STAGE_LOOK_EYE, false), camera, 0.1 * camera);
+  EXPECT_LT(std::abs(distance(LOWLUX_STAGE_LOOK_EYE, true)), 0.2 * camera) << "rods alone see no green";
+}
+
 TEST(StageParams, OfMonochromeFramesHaveNoColour) {
   for (const RawFormatNames& names : raw_formats()) {
     if (names.format.layout != SensorLayout::monochrome || names.format.bits != 10) continue;

@@ -20,7 +20,8 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double still_ev = 0.1;  // exposure stays unchanged for targets nearer than this
-constexpr double step = 0.15;  // fraction of the difference by which exposure, white and noise follow with each frame
+constexpr double step = 0.15;   // fraction of the difference by which exposure, white and noise follow with each frame
+constexpr double d65_k = 6504;  // colour temperature of output_white
 // Fraction of white. A frame that is bright everywhere shows no black; pedestals of cameras are an eighth of white at
 // most.
 constexpr double highest_black = 0.25;
@@ -274,8 +275,12 @@ Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame)
     out.exposure_ev = smooth_exposure(automatic.ev);
     out.exposure_rule = name_of(automatic.rule);
   }
+  std::optional<WhitePoint> white = out.white;
+  // A matrix to the image's primaries states colours relative to its white, not to the light of the scene.
+  if (!white && facts.colour_matrix && frame.raw.layout != SensorLayout::monochrome)
+    white = WhitePoint{.xy = output_white, .cct_k = d65_k};
   Result<std::optional<LookPlan>> look = plan_look(
-      frame, {blocks_, noise_std, out.white, out.exposure_ev, *balanced, 0, thumbnail_.light_range}, plan_.options);
+      frame, {blocks_, noise_std, white, out.exposure_ev, *balanced, 0, thumbnail_.light_range}, plan_.options);
   if (!look) return tl::make_unexpected(std::move(look.error()));
   out.look = *std::move(look);
   if (out.look) out.exposure_ev += out.look->dimming_ev;
