@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -45,7 +46,30 @@ struct Scatter {
   double group_variance_e2 = 0;  // of one group's mean about the line's common offset
   double line_variance_e2 = 0;   // of the line's common offset, as measured by medians: V + e^2
   double groups_used = 0;
+  double unevenness = 0;  // see LineOffsets
 };
+
+/// Returns LineOffsets::unevenness.
+/// @param common  differences of lines two apart
+double unevenness_of(const Plane<double>& means, const std::vector<double>& common) {
+  std::vector<int> lines;
+  for (int line = 0; line + 2 < means.width(); ++line) {
+    if (std::isfinite(common[line])) lines.push_back(line);
+  }
+  const auto end = lines.begin() + static_cast<std::ptrdiff_t>((lines.size() + 3) / 4);
+  std::ranges::nth_element(lines, end, std::greater{}, [&](int line) { return std::abs(common[line]); });
+  double within_e2 = 0, groups_in = 0, between_e2 = 0;
+  for (auto line = lines.begin(); line != end; ++line) {
+    for (int g = 0; g < groups; ++g) {
+      const double d = means.at(*line + 2, g) - means.at(*line, g) - common[*line];
+      if (!std::isfinite(d)) continue;
+      within_e2 += d * d;
+      groups_in += 1;
+    }
+    between_e2 += common[*line] * common[*line] / static_cast<double>(end - lines.begin());
+  }
+  return between_e2 > 0 ? within_e2 / groups_in / between_e2 : INFINITY;
+}
 
 /// Returns the scatter, or nullopt where too few lines can be compared.
 std::optional<Scatter> scatter_of(const Plane<double>& means) {
@@ -66,7 +90,7 @@ std::optional<Scatter> scatter_of(const Plane<double>& means) {
   if (used < fewest_pixels) return std::nullopt;
   const double inside = robust_std(within), across = robust_std(between);
   // Each difference holds the noise of two lines, and the groups' own centre has been subtracted.
-  return Scatter{inside * inside / 2 * used / (used - 1), across * across / 2, used};
+  return Scatter{inside * inside / 2 * used / (used - 1), across * across / 2, used, unevenness_of(means, common)};
 }
 
 tl::unexpected<Error> too_little(const Plane<double>& means, PlaneView<const float> pixels) {
@@ -178,6 +202,7 @@ Result<LineOffsets> line_offsets_of_frame(PlaneView<const float> charge_e, Lines
                                              : std::max(of->scatter.line_variance_e2 - error_e2, 0.0);
   out.line_std_e = std::sqrt(line_e2);
   out.measured_std_e = std::sqrt(error_e2);
+  out.unevenness = of->scatter.unevenness;
   out.gain = share(line_e2, line_e2 + error_e2);
   if (options.min_std_e > 0 && (out.line_std_e < options.min_std_e || out.gain < 0.5)) {
     out.residual_std_e = out.line_std_e;

@@ -24,6 +24,10 @@ struct LineOffsets {
   double measured_std_e = 0;     // error of one line's measured offset
   double gain = 0;               // V / (V + e^2), V = line_std_e^2, e = measured_std_e
   double residual_std_e = 0;     // predicted standard deviation of the lines' noise once the offsets are subtracted
+  /// Variance of the 16 groups of a line about its difference from the next line of the same colours, relative to the
+  /// square of the difference, for the quarter of lines that differ most. What the scene adds differs between colours
+  /// and along the line, an offset of the readout only by the noise of the pixels.
+  double unevenness = 0;
 };
 
 /// Measures offsets in light-shielded pixels next to the image: each line's mean less the median of all lines of even

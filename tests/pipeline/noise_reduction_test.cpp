@@ -237,18 +237,49 @@ TEST(NoiseReduction, RowNoiseIsTakenOffWhereItStandsOut) {
   EXPECT_TRUE(planned(with_row_noise(1), {.mode = Mode::level, .line_noise = false}).noise_reduction.lines.empty());
 }
 
-// Rows that differ by more than the read noise may be a blind of the scene.
-TEST(NoiseReduction, RowsThatDifferByMoreThanTheReadNoiseStayWithAWarning) {
-  const auto warns = [](double std_e) {
+bool warns_of_rows(const DevelopPlan& plan) {
+  return std::ranges::any_of(plan.warnings, [](const std::string& warning) {
+    return warning.starts_with("rows differ by ") && warning.find("are left in") != std::string::npos;
+  });
+}
+
+TEST(NoiseReduction, StrongRowNoiseIsSubtractedAndWhatIsLeftIsInTheModel) {
+  for (const double std_e : {10.0, 20.0, 30.0}) {
     const DevelopPlan plan = planned(with_row_noise(std_e), {.mode = Mode::level});
-    return std::ranges::any_of(plan.warnings, [](const std::string& warning) {
-      return warning.starts_with("rows differ by ") && warning.find("is left in") != std::string::npos;
-    });
-  };
-  EXPECT_FALSE(warns(0));
-  EXPECT_FALSE(warns(1));
-  EXPECT_TRUE(warns(4));
-  EXPECT_TRUE(planned(with_row_noise(4), {.mode = Mode::level}).noise_reduction.lines.empty());
+    EXPECT_FALSE(warns_of_rows(plan)) << std_e;
+    ASSERT_EQ(plan.noise_reduction.lines.size(), 1U) << std_e;
+    const denoise::LineOffsets& lines = plan.noise_reduction.lines[0];
+    EXPECT_NEAR(lines.line_std_e, std_e, 5 * std_e / std::sqrt(2.0 * 256)) << "of 256 rows";
+    EXPECT_LT(lines.residual_std_e, 0.5 * std_e);
+    const auto of_pixels = planned(with_row_noise(0), {.mode = Mode::level}).noise_reduction.noise.variance_e2;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double left_e2 = lines.residual_std_e * lines.residual_std_e;
+      EXPECT_NEAR(plan.noise_reduction.noise.variance_e2[c], of_pixels[c] + left_e2, 1e-9 * left_e2);
+    }
+  }
+}
+
+// A blind adds light: more to green than to red and blue, whatever the light is.
+TEST(NoiseReduction, ABlindStaysWithAWarning) {
+  std::mt19937 engine(3);
+  std::uniform_real_distribution<double> share(0.25, 0.7), log_step(std::log(6.0), std::log(60.0));
+  std::uniform_int_distribution<int> slat(2, 9);
+  for (int i = 0; i < 40; ++i) {
+    const double step_e = std::exp(log_step(engine)), red = share(engine), blue = share(engine);
+    const int rows = slat(engine);
+    const auto scene = [&](int, int y) {
+      const double e = 20 + (y / rows % 2 == 0 ? step_e : 0);
+      return std::array{red * e, e, blue * e};
+    };
+    const DevelopPlan plan = planned(test::night_frame({}, scene, 512, 512), {.mode = Mode::level});
+    // Wide slats are edges, between which lines do not differ.
+    for (const denoise::LineOffsets& lines : plan.noise_reduction.lines) {
+      EXPECT_LT(lines.line_std_e, 2) << step_e << ' ' << red << ' ' << blue << ' ' << rows;
+    }
+    if (rows > 3) continue;
+    EXPECT_TRUE(plan.noise_reduction.lines.empty()) << step_e << ' ' << red << ' ' << blue << ' ' << rows;
+    EXPECT_TRUE(warns_of_rows(plan)) << step_e << ' ' << red << ' ' << blue << ' ' << rows;
+  }
 }
 
 TEST(NoiseReduction, MapsAreThoseOfTheActiveAreaIfAskedFor) {

@@ -111,6 +111,7 @@ double line_std_e(std::span<const PlaneView<const float>> parts, denoise::Lines 
   if (measured == 0) return 0;
   const double part_length = rows ? parts.front().width : parts.front().height;
   mean.line_std_e = std::sqrt(sum_e2 / measured);
+  mean.unevenness = 0;  // only whole lines show whether strong ones are noise
   mean.measured_std_e *= std::sqrt(part_length / (rows ? active.width : active.height));
   mean.gain = sum_e2 / (sum_e2 + measured * mean.measured_std_e * mean.measured_std_e);
   return lines_stand_out(mean, noise) ? mean.line_std_e : 0;

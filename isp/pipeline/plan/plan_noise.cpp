@@ -71,6 +71,9 @@ double black_std_e(const denoise::RawNoise& noise) {
 }
 
 constexpr double min_strong_lines = 0.5;  // of the noise of the median pixel
+/// Lines that are stronger than a pixel's noise without light are noise below this LineOffsets::unevenness. That of the
+/// scene is ((1 - r) / (1 + r))^2 at least, r the ratio of the two channels of a line: 0.06 for r = 0.6.
+constexpr double max_unevenness = 0.02;
 
 /// Returns the least visible standard deviation of line noise: the eye integrates it along lines.
 double min_line_std_e(const denoise::RawNoise& noise) { return 0.03 * black_std_e(noise); }
@@ -80,15 +83,14 @@ double pixel_std_e(const denoise::RawNoise& noise, double snr) {
   return 0.5 * (snr + std::hypot(snr, 2 * black_std_e(noise)));
 }
 
-/// Returns the warning of lines that are too strong to be taken for noise, where they stand out of that of the median
-/// pixel; empty for others.
+/// Returns the warning of lines that are too strong to be taken for noise, where they are visible above that of the
+/// median pixel; empty for others.
 std::string warning_of_strong_lines(const denoise::LineOffsets& found, const denoise::RawNoise& noise, double snr) {
-  if (found.gain < 0.5 || found.line_std_e < black_std_e(noise)) return {};
+  if (found.gain < 0.5 || lines_stand_out(found, noise)) return {};
   if (found.line_std_e < min_strong_lines * pixel_std_e(noise, snr)) return {};
   return fmt::format(
-      "{} differ by {:.3g} e-, which is more than the read noise, so that it may be a fence or a blind of the scene: "
-      "it "
-      "is left in; if the camera makes it, --dark-frame removes what is the same in every frame",
+      "{} differ by {:.3g} e-, more than the read noise; they may be noise or a fence of the scene, and are left in; "
+      "what is the same in every frame --dark-frame removes",
       found.lines == denoise::Lines::rows ? "rows" : "columns", found.line_std_e);
 }
 
@@ -117,7 +119,11 @@ void subtract_measured_lines(const RawFrame& frame, RawElectrons& charge, NoiseR
   for (const denoise::LineOffsets& lines : out.lines) {
     subtract_lines(lines, charge.value.view());
     const double gone_e2 = lines.line_std_e * lines.line_std_e - lines.residual_std_e * lines.residual_std_e;
-    for (double& variance : out.noise.variance_e2) variance = std::max(variance - gone_e2, 0.25 * variance);
+    const double left_e2 = lines.residual_std_e * lines.residual_std_e;
+    for (double& variance : out.noise.variance_e2) {
+      // Lines that are stronger than the model's noise are not in it: what is left of them is more.
+      variance = gone_e2 < variance ? std::max(variance - gone_e2, 0.25 * variance) : variance + left_e2;
+    }
   }
 }
 
@@ -168,7 +174,8 @@ bool is_denoised_before(const RawFrame& frame, const DenoiseChoice& choice) {
 }
 
 bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise) {
-  return found.gain >= 0.5 && found.line_std_e > min_line_std_e(noise) && found.line_std_e < black_std_e(noise);
+  if (found.gain < 0.5 || !(found.line_std_e > min_line_std_e(noise))) return false;
+  return found.line_std_e < black_std_e(noise) || found.unevenness < max_unevenness;
 }
 
 std::optional<denoise::Level> level_for(double snr) {

@@ -24,8 +24,9 @@ std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& leve
 bool is_denoised_before(const RawFrame& frame, const DenoiseChoice& choice);
 
 /// Returns whether row or column noise is significant and thus subtracted: it is more than the error of its
-/// measurement, and more than 3 % of a pixel's noise, as the eye integrates it along a line. More than a pixel's noise
-/// is not from the readout but scene structure, such as a blind or a fence.
+/// measurement, and more than 3 % of a pixel's noise, as the eye integrates it along a line. Lines that differ by more
+/// than a pixel's noise without light are taken for scene structure, such as a blind or a fence, unless the offset is
+/// the same in both colours of a line and all along it.
 bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise);
 
 /// Decides how noise is reduced. Errors for a requested level: those of noise_obstacle. For an automatic level these
