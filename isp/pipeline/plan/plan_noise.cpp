@@ -219,7 +219,10 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   const bool with_lines = choice.line_noise && request.lines;
   const denoise::NoiseCheck check = check_frame(frame, levels, with_lines, out, whole, executor);
   if (charge != nullptr) *charge = std::move(whole);
-  add_remarks(check, *frame.noise, out.warnings);
+  NoiseProfile of_frame = *frame.noise;
+  // Merged frames that moved were interpolated: they have less noise on fine scales than in the mean of a pixel.
+  of_frame.reduced = of_frame.reduced || frame.noise_ratio != nullptr;
+  add_remarks(check, of_frame, out.warnings);
   out.options.variance_scale = denoise::variance_scale_of(check);
   return out;
 }
