@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <random>
 #include <span>
 #include <string>
@@ -303,6 +304,31 @@ TEST(PixelNoise, SaysWhatItDoesNotDo) {
   DevelopOptions within = options_of({.mode = DenoiseChoice::Mode::automatic});
   within.effects.emplace();
   EXPECT_EQ(plan_develop(frame, within, one_thread)->noise_reduction.level, Level::standard);
+}
+
+/// Returns the mean code of a flat of these electrons, with the noise of the image limited.
+double mean_code(const RawFrame& frame, const DenoiseChoice& denoise, std::optional<double> noise_limit) {
+  DevelopOptions options{.exposure_ev = 6};
+  options.find_defects = false;
+  options.denoise = denoise;
+  options.look.noise_limit = noise_limit;
+  const Result<Developed> out = develop(frame, options, one_thread);
+  EXPECT_TRUE(out) << out.error().message;
+  const Plane<std::uint8_t>& picture = std::get<Encoded8>(out->picture).codes;
+  double sum = 0;
+  for (std::size_t i = 0; i < picture.size(); ++i) sum += picture.data()[i];
+  return sum / static_cast<double>(picture.size());
+}
+
+// What limits the brightness of shadows is the noise that is left in the image.
+TEST(PixelNoise, OfTheImageIsThatWhichIsLeft) {
+  for (const SensorLayout layout : layouts) {
+    const RawFrame frame = pixel_frame(layout, flat(15, 15, 15), 128, 128, 3);
+    const double without = mean_code(frame, at(Level::standard), std::nullopt);
+    EXPECT_NEAR(mean_code(frame, at(Level::standard), 3), without, 0.02 * without) << static_cast<int>(layout);
+    EXPECT_LT(mean_code(frame, {}, 3), 0.8 * without) << static_cast<int>(layout);
+    EXPECT_LT(mean_code(frame, at(Level::standard), 0.05), 0.8 * without) << static_cast<int>(layout);
+  }
 }
 
 }  // namespace

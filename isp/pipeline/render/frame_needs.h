@@ -40,8 +40,7 @@ inline bool needs_seeing_map(const DevelopPlan& plan) {
 }
 
 inline bool keeps_maps(const DevelopPlan& plan) {
-  const bool in_cells = plan.noise_reduction.cell_e.has_value();  // whose noise of luminance is that of the model
-  return plan.noise_reduction.has_level() && (plan.options.denoise.maps || (needs_noise(plan) && !in_cells));
+  return plan.noise_reduction.has_level() && (plan.options.denoise.maps || needs_noise(plan));
 }
 
 }  // namespace lowlux::isp

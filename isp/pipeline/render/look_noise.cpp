@@ -4,27 +4,38 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 
 #include "isp/base/look_grid.h"
 #include "isp/pipeline/render/cell_figures.h"
+#include "isp/pipeline/render/pixel_cells.h"
 
 namespace lowlux::isp {
 namespace {
 
-// Averages the residual variance of luma over the cells of 2 x 2 that lie in each cell of the grid.
-void of_maps(const DevelopPlan& plan, const Rect& crop, const PlaneView<const float>& residual, PlaneView<float> out,
+/// Returns the luma of white in the unit of the maps of residual variance [e-].
+double luma_at_white(const DevelopPlan& plan, const RawDn& raw) {
+  const std::optional<std::array<double, 3>>& cell_e = plan.noise_reduction.cell_e;
+  if (!cell_e) return mean_of_sites(light_at_white_e(plan.levels));
+  return (*cell_e)[1] / parts_of(raw)[1];  // luma is of colours balanced to green; see scale_to_pixels
+}
+
+// Averages the residual variance of luma over the cells of the denoiser that lie in each cell of the grid: a cell is 2
+// x 2 sites, or a pixel that has all colours or none.
+void of_maps(const DevelopPlan& plan, const RawDn& raw, const PlaneView<const float>& residual, PlaneView<float> out,
              Executor& executor) {
+  const Rect& crop = raw.default_crop;
   const std::array<float, 3> weights = luminance_of_camera(plan);
-  const auto electrons = static_cast<float>(mean_of_sites(light_at_white_e(plan.levels)));
-  const float unit = (weights[0] + weights[1] + weights[2]) / electrons;
-  const int cells = plan.options.half ? 4 : 2;  // cells of the map along a side of the grid's
+  const float unit = (weights[0] + weights[1] + weights[2]) / static_cast<float>(luma_at_white(plan, raw));
+  const int side = plan.noise_reduction.cell_e ? 1 : 2;  // of a cell of the denoiser [px]
+  const int cells = (plan.options.half ? 8 : 4) / side;  // along a side of the grid's
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       for (int x = 0; x < out.width; ++x) {
         float sum = 0;
         for (int k = 0; k < cells * cells; ++k) {
-          sum += residual.at(std::min(crop.x / 2 + cells * x + k % cells, residual.width - 1),
-                             std::min(crop.y / 2 + cells * y + k / cells, residual.height - 1));
+          sum += residual.at(std::min(crop.x / side + cells * x + k % cells, residual.width - 1),
+                             std::min(crop.y / side + cells * y + k / cells, residual.height - 1));
         }
         out.row(y)[x] = unit * unit * sum / static_cast<float>(cells * cells);
       }
@@ -86,8 +97,8 @@ std::array<float, 3> luminance_of_camera(const DevelopPlan& plan) {
 
 void noise_of_luminance(const DevelopPlan& plan, const RawFrame& frame, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor) {
-  if (plan.noise_reduction.has_level() && !plan.noise_reduction.cell_e) {
-    of_maps(plan, frame.raw.default_crop, maps.residual_variance_e2.view(), out, executor);
+  if (plan.noise_reduction.has_level()) {
+    of_maps(plan, frame.raw, maps.residual_variance_e2.view(), out, executor);
   } else {
     const RawDn& raw = frame.raw;
     of_model(plan, raw.default_crop, profile_of_light(plan, *frame.noise, raw.phase), quarter, out, executor);
