@@ -8,6 +8,7 @@
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/plan/plan_noise.h"
 #include "isp/pipeline/render/electron_mosaic.h"
+#include "isp/pipeline/render/pixel_cells.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/to_linear.h"
 
@@ -20,16 +21,18 @@ void describe_noise(const RawFrame& frame, const DevelopPlan& plan, FrameElectro
   out.saturation_e.fill(std::numeric_limits<double>::infinity());
   for (int site = 0; site < 4; ++site) {
     const auto colour = static_cast<std::size_t>(colour_at(out.phase, site & 1, site >> 1));
+    // The plan states the noise of a monochrome pixel as that of a site of its cell.
+    const double part = is_mosaic(frame.raw) ? 1 : parts_of(frame.raw)[colour];
     const double electrons = (*plan.levels.electrons_at_white)[site];
     if (plan.levels.dark_frame) {
       const double e_per_dn = electrons / (white_at(frame.raw, site) - plan.levels.black.pedestal_dn[site]);
       out.common_variance_e2[site] = plan.levels.dark_frame->added_variance_dn2[site] * e_per_dn * e_per_dn;
     }
-    out.dark_charge_e[site] = noise.dark_mean_e[site];
-    out.variance_e2[site] =
-        std::max(noise.variance_e2[colour] + noise.dark_mean_e[site] - out.common_variance_e2[site], 0.0);
+    out.dark_charge_e[site] = noise.dark_mean_e[site] / part;
+    const double variance_e2 = noise.variance_e2[colour] / part + out.dark_charge_e[site];
+    out.variance_e2[site] = std::max(variance_e2 - out.common_variance_e2[site], 0.0);
     out.saturation_e[colour] =
-        std::min(out.saturation_e[colour], noise.saturation_e[colour] - plan.levels.black.dark_mean_e[site]);
+        std::min(out.saturation_e[colour], noise.saturation_e[colour] / part - plan.levels.black.dark_mean_e[site]);
   }
 }
 

@@ -60,6 +60,31 @@ TEST(MergeLevels, FramesOfDifferentBlackAndWhiteLevelsAreAveragedByTheirLight) {
   }
 }
 
+TEST(MergeLevels, MonochromeFramesKeepTheirLightAndNoiseAtEveryLevel) {
+  constexpr std::uint64_t seed = 5;
+  std::mt19937_64 draw(seed);
+  const double white_e = (test::night_white_dn - test::night_black_dn) / test::night_gain_dn_per_e;
+  std::uniform_real_distribution<double> log_light(std::log(5.0), std::log(0.5 * white_e));
+  for (int i = 0; i < 4; ++i) {
+    const double level_e = std::exp(log_light(draw));
+    Burst burst{.width = 160, .height = 128, .mean_e = level_e, .neutral = {1, 1, 1}};
+    burst.disturb = [](RawFrame& frame, int) { frame.raw.layout = SensorLayout::monochrome; };
+    const double scene_e = burst.mean_truth_e();
+    for (const MergeWay& way : test::ways_without_stars()) {
+      if (way.options.drizzle || way.bracket) continue;
+      const std::string where = way.name + ", level " + std::to_string(level_e) + " e-, seed " + std::to_string(seed);
+      const auto merged = tried(way.of(burst), 4, way.options);
+      ASSERT_TRUE(merged) << where << merged.error().message;
+      EXPECT_NEAR(test::mean_e(*merged, white_e), scene_e, 5 * std::sqrt((scene_e + 4) / (burst.width * burst.height)))
+          << where;
+      EXPECT_NEAR(burst.mean_square_error(merged->frame, white_e) / (scene_e + 4), 0.25, 0.05) << where;
+      const RawFrame one = way.of(burst).frame(0);
+      EXPECT_NEAR(merged->frame.noise->offset[1] / one.noise->offset[1], 0.25, 0.05) << where;
+      EXPECT_NEAR(merged->frame.noise->scale[1] / one.noise->scale[1], 0.25, 0.05) << where;
+    }
+  }
+}
+
 TEST(MergeLevels, OrientationAndCropAreThoseOfTheReference) {
   constexpr std::uint64_t seed = 31;
   std::mt19937_64 draw(seed);
