@@ -10,6 +10,7 @@
 #include "isp/pipeline/render/electron_mosaic.h"
 #include "isp/pipeline/render/pixel_cells.h"
 #include "isp/raw/black_point.h"
+#include "isp/raw/corrections.h"
 #include "isp/raw/to_linear.h"
 
 namespace lowlux::isp {
@@ -56,7 +57,16 @@ DevelopOptions options_of_signal(const DevelopOptions& options, denoise::Level l
   return out;
 }
 
-Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptions& options, Executor& executor) {
+Plane<float> shading_gain(const RawCorrections& corrections, int width, int height, Executor& executor) {
+  if (corrections.gain_maps.empty() && corrections.radial_gains.empty()) return {};
+  Plane<float> out(width, height);
+  std::fill_n(out.data(), out.size(), 1.0F);
+  apply_gains(corrections, out.view(), executor);
+  return out;
+}
+
+Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptions& options, Executor& executor,
+                                       bool with_gain) {
   if (frame.raw.layout == SensorLayout::linear_rgb) {
     return fail(ErrorCode::unsupported,
                 frame.raw.from_x_trans
@@ -73,6 +83,9 @@ Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptio
   const std::vector<Pixel> defects = std::exchange(plan->levels.defects, {});
   if (charge.value.empty()) charge = raw_electrons(frame, plan->levels, executor);
   out.signal_e = subtract_dark(std::move(charge), plan->levels.black, executor).value;
+  if (with_gain) {
+    out.gain = shading_gain(frame.corrections, out.signal_e.width(), out.signal_e.height(), executor);
+  }
   for (const Pixel& defect : defects) out.signal_e.at(defect.x, defect.y) = std::numeric_limits<float>::quiet_NaN();
   return out;
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "isp/base/correction.h"
 #include "isp/base/executor.h"
 #include "isp/base/frame.h"
 #include "isp/base/plane.h"
@@ -24,6 +25,8 @@ struct FrameElectrons {
   PerSite<double> common_variance_e2{};  // of the subtracted dark frame, which frames of one exposure share
   std::array<double, 3> saturation_e{};  // signal from which on a site of R, G, B is saturated
   PerSite<double> light_at_white_e{};
+  Plane<float>
+      gain;  // that corrects the lens's shading at each pixel, as the frame states it; empty: none, or not wanted
   std::vector<std::string> warnings;
 };
 
@@ -35,9 +38,15 @@ inline merge::FrameView view_of(const FrameElectrons& frame) {
 /// dark charge, defects, line noise and interpolation are kept; those of the image, such as its crop, are not.
 DevelopOptions options_of_signal(const DevelopOptions& options, denoise::Level level);
 
+/// Returns the gain of each pixel by which a frame's corrections undo the shading of its lens; empty where they hold
+/// none.
+Plane<float> shading_gain(const RawCorrections& corrections, int width, int height, Executor& executor);
+
 /// Measures a frame as plan_develop does and converts it. The options that matter are those of black level, dark frame,
 /// defects and line noise. Errors: those of plan_develop; unknown noise (insufficient), three colours in each pixel
 /// (unsupported).
-Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptions& options, Executor& executor);
+/// @param with_gain  whether FrameElectrons::gain is wanted
+Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptions& options, Executor& executor,
+                                       bool with_gain = false);
 
 }  // namespace lowlux::isp

@@ -83,7 +83,8 @@ Result<FrameElectrons> FrameLoader::read_reference(int index) {
   Result<FrameToMerge> frame = read_(index);
   if (!frame) return tl::make_unexpected(frame.error());
   clock_.lap(waiting_stage);
-  Result<FrameElectrons> electrons = frame_electrons(frame->frame, frame->options, executor_);
+  with_gain_ = true;
+  Result<FrameElectrons> electrons = frame_electrons(frame->frame, frame->options, executor_, with_gain_);
   if (!electrons) return tl::make_unexpected(at_frame(electrons.error(), frame->name));
   clock_.lap("black and noise");
   reference_ = *std::move(frame);
@@ -149,7 +150,7 @@ Result<FrameElectrons> FrameLoader::electrons_of(const FrameToMerge& read) {
     PerSite<double>& charge_e = options.series_dark_e.emplace(dark_->charge_e);
     for (double& charge : charge_e) charge *= ratio;
   }
-  Result<FrameElectrons> out = frame_electrons(read.frame, options, executor_);
+  Result<FrameElectrons> out = frame_electrons(read.frame, options, executor_, with_gain_);
   if (out && out->dark_is_estimated && !dark_) dark_ = SeriesDark{out->dark_charge_e, last_, false};
   return out;
 }

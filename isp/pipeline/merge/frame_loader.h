@@ -37,6 +37,8 @@ class FrameLoader {
 
   /// States the frames that next() returns, in this order.
   void expect(std::vector<int> order);
+  /// States that FrameElectrons::gain is not wanted of the frames that next() returns.
+  void omit_gains() { with_gain_ = false; }
   /// Returns the next frame. Errors: those of reading and of frame_electrons; a frame that does not fit.
   Result<FrameElectrons> next();
 
@@ -58,6 +60,7 @@ class FrameLoader {
   FrameInfo last_;  // of the frame that was read last
   std::string last_name_;
   bool exposures_differ_ = false;
+  bool with_gain_ = true;
   /// Holds the dark charge that the reference shows, or, if it shows none, the first frame of another exposure that
   /// does: one decision for all, since frames that differ by dark charge would not match.
   struct SeriesDark {

@@ -8,6 +8,7 @@
 
 #include "isp/merge/align/align.h"
 #include "isp/pipeline/merge/merge_budget.h"
+#include "isp/pipeline/merge/shading.h"
 
 namespace lowlux::isp {
 namespace {
@@ -24,14 +25,18 @@ Result<void> measure_motion(MergeContext& work, MergeChoice& choice) {
   for (const int index : {work.count - 1, work.count / 2}) {
     if (index != work.out.reference && (order.empty() || order.front() != index)) order.push_back(index);
   }
-  const merge::AlignReference reference(view_of(work.reference), work.executor);
+  Executor& executor = work.executor;
+  const auto reference = with_unshaded(
+      work.reference, executor, [&](const merge::FrameView& view) { return merge::AlignReference(view, executor); });
   work.loader.expect(order);
   for (const int index : order) {
     Result<FrameElectrons> frame = work.loader.next();
     if (!frame) return tl::make_unexpected(frame.error());
     const Result<double> light = work.stated_light();
     if (!light) return tl::make_unexpected(light.error());
-    merge::Motion motion = merge::find_motion(reference, view_of(*frame), *light, {}, work.executor);
+    merge::Motion motion = with_unshaded(*frame, executor, [&](const merge::FrameView& view) {
+      return merge::find_motion(reference, view, *light, {}, executor);
+    });
     if (has_moved(motion)) choice.method.alignment = MergeAlignment::subpixel;
     choice.motions.emplace(index, std::move(motion));
   }

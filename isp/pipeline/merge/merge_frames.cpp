@@ -53,6 +53,8 @@ Result<void> check_memory(const MergeContext& work) {
 
 /// Averages the frames of a camera at rest. Unfinished as static_mean is.
 Result<void> merge_static(MergeContext& work) {
+  work.reference.gain = {};
+  work.loader.omit_gains();
   Result<merge::MosaicMean> mean = static_mean(work);
   if (!mean) return tl::make_unexpected(mean.error());
   if (!work.loader.exposures_differ()) {

@@ -14,6 +14,7 @@
 #include "isp/pipeline/merge/merge_budget.h"
 #include "isp/pipeline/merge/merged_mosaic.h"
 #include "isp/pipeline/merge/predicted_frame.h"
+#include "isp/pipeline/merge/shading.h"
 #include "isp/pipeline/merge/star_reference.h"
 
 namespace lowlux::isp {
@@ -129,8 +130,21 @@ Result<void> MovedMerge::check_bracket() const {
 }
 
 Result<void> MovedMerge::prepare_alignment() {
+  if (!changes_shading()) {
+    work_.reference.gain = {};
+    work_.loader.omit_gains();
+  }
   if (!by_stars()) {
-    tiles_.emplace(view_of(work_.reference), work_.executor);
+    with_unshaded(work_.reference, work_.executor,
+                  [&](const merge::FrameView& view) { tiles_.emplace(view, work_.executor); });
+    if (work_.reference.gain.empty()) return {};
+    // Gains of single pixels do not outlast motion: encode_merged smooths them.
+    RawCorrections smooth = work_.loader.reference().corrections;
+    smooth_gain_maps(smooth, work_.height, work_.executor);
+    gain_ = shading_gain(smooth, work_.width, work_.height, work_.executor);
+    change_shading(work_.reference, merge::no_motion(work_.width, work_.height), std::as_const(gain_).view(),
+                   work_.executor);
+    work_.reference.gain = {};
     return {};
   }
   Result<StarAlignment> found = StarAlignment::of(view_of(work_.reference), work_.executor);
@@ -228,6 +242,8 @@ Result<void> MovedMerge::add(FrameElectrons& frame, int index) {
   work_.report_added();
   if (!motion) return {};
   Executor& executor = work_.executor;
+  if (changes_shading()) change_shading(frame, *motion, std::as_const(gain_).view(), executor);
+  frame.gain = {};
   Plane<float> site_weight;
   bool is_least = false;  // of the frames of a bracket so far
   if (bracket_) {
@@ -277,7 +293,9 @@ std::optional<merge::Motion> MovedMerge::measured_motion(const FrameElectrons& f
     return stars_->motion_of(view_of(frame), work_.out.frames[static_cast<std::size_t>(index)], work_.executor);
   }
   if (auto known = known_motions_.extract(index)) return std::move(known.mapped());
-  return merge::find_motion(*tiles_, view_of(frame), light, {}, work_.executor);
+  return with_unshaded(frame, work_.executor, [&](const merge::FrameView& view) {
+    return merge::find_motion(*tiles_, view, light, {}, work_.executor);
+  });
 }
 
 /// Adds a frame where it matches.

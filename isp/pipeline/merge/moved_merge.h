@@ -50,6 +50,9 @@ class MovedMerge {
   /// Returns whether the reference is the robust mean of a few frames.
   bool has_robust_reference() const { return work_.compares() && !work_.out.bracket && by_stars(); }
   bool predicts() const;
+  /// Returns whether frames get the shading of the reference. Frames at rest have it, and of those aligned by stars the
+  /// foreground does.
+  bool changes_shading() const { return work_.out.alignment != MergeAlignment::none && !by_stars(); }
   RgbView<const float> expected() const;
 
   Result<void> check_bracket() const;
@@ -74,6 +77,7 @@ class MovedMerge {
   std::optional<BracketFrames> bracket_;
   std::optional<merge::AlignReference> tiles_;  // how frames are aligned
   std::optional<StarAlignment> stars_;
+  Plane<float> gain_;                      // of the result; empty: it has no shading
   CameraRgb prediction_;                   // of the reference, without noise
   Plane<std::uint8_t> still_;              // blocks of the foreground: 1; empty: none
   std::optional<merge::MosaicMean> mean_;  // the sum is one of these

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <numbers>
 #include <random>
+#include <utility>
 
 #include "tests/pipeline/merge/merge_bursts.h"
 
@@ -72,6 +73,70 @@ TEST(MergeMoving, DetailThatNoiseHidesInOneFrameKeepsItsContrast) {
   std::printf("contrast kept of 8 and 32 frames: %.3f, %.3f\n", of_8, of_32);
   EXPECT_GT(of_8, 0.73);
   EXPECT_GT(of_32, 0.87);
+}
+
+/// Shades the corners of a frame to a share of its light, and states the gain that corrects it. Saturated pixels stay.
+void shade(RawFrame& frame, double corner_share) {
+  const double k = 1 / corner_share - 1;
+  const Plane<std::uint16_t>& dn = frame.raw.dn;
+  const double cx = 0.5 * (dn.width() - 1), cy = 0.5 * (dn.height() - 1), corner2 = cx * cx + cy * cy;
+  for (int y = 0; y < dn.height(); ++y) {
+    for (int x = 0; x < dn.width(); ++x) {
+      if (frame.raw.dn.at(x, y) >= test::night_white_dn) continue;
+      const double r2 = (std::pow(x - cx, 2) + std::pow(y - cy, 2)) / corner2;
+      const double above = (frame.raw.dn.at(x, y) - test::night_black_dn) / (1 + k * r2);
+      frame.raw.dn.at(x, y) = static_cast<std::uint16_t>(std::lround(test::night_black_dn + above));
+    }
+  }
+  frame.corrections.radial_gains = {RadialGain{.k = {k}}};
+}
+
+// Content that a lens shades in one frame is brighter in another, where it is nearer to the middle.
+TEST(MergeMoving, ShadingOfTheLensIsThatOfTheReference) {
+  const Burst even = hand_held(60);
+  const MergedRaw expected = even.merged(6, {.alignment = MergeAlignment::subpixel});
+  // Mean and mean square, relative to the scene.
+  const auto relative_errors = [&](const MergedRaw& merged, double corner_share) {
+    std::pair<double, double> out;
+    for (int y = middle.y; y < middle.y + middle.height; ++y) {
+      for (int x = middle.x; x < middle.x + middle.width; ++x) {
+        const double r2 = (std::pow(x - 159.5, 2) + std::pow(y - 127.5, 2)) / (159.5 * 159.5 + 127.5 * 127.5);
+        const double share = 1 / (1 + (1 / corner_share - 1) * r2);
+        const double error = Burst::signal_e(merged.frame, x, y) / share / even.truth_e(x, y) - 1;
+        out.first += error / (middle.width * middle.height);
+        out.second += error * error / (middle.width * middle.height);
+      }
+    }
+    return out;
+  };
+  for (const double corner_share : {0.7, 0.4}) {
+    Burst shaded = even;
+    shaded.disturb = [&](RawFrame& frame, int) { shade(frame, corner_share); };
+    const MergedRaw merged = shaded.merged(6, {.alignment = MergeAlignment::subpixel});
+    for (std::size_t i = 1; i < merged.frames.size(); ++i) {
+      EXPECT_GT(merged.frames[i].used_fraction, 0.97) << i << ' ' << corner_share;
+      EXPECT_NEAR(merged.frames[i].largest_shift_px, expected.frames[i].largest_shift_px, 0.3)
+          << i << ' ' << corner_share;
+    }
+    const auto [bias, square] = relative_errors(merged, corner_share);
+    EXPECT_NEAR(bias, 0, 0.005) << corner_share;
+    EXPECT_LT(square, 1.1 * relative_errors(expected, 1).second) << corner_share;
+  }
+}
+
+TEST(MergeMoving, ShadingLeavesSaturatedPixelsWhite) {
+  Burst burst = hand_held(60);
+  const auto is_lamp = [](double x, double y) { return std::hypot(x - 250, y - 70) < 30; };
+  burst.scene = [&](double x, double y, int colour) { return is_lamp(x, y) ? 1e5 : test::textured(x, y, colour, 60); };
+  burst.disturb = [&](RawFrame& frame, int) { shade(frame, 0.4); };
+  for (const bool robust : {false, true}) {
+    const MergedRaw merged = burst.merged(4, {.robust = robust, .alignment = MergeAlignment::subpixel});
+    for (int y = 60; y < 80; ++y) {
+      for (int x = 240; x < 260; ++x) {
+        ASSERT_GE(Burst::signal_e(merged.frame, x, y), 0.99 * test::night_full_e()) << x << ' ' << y << ' ' << robust;
+      }
+    }
+  }
 }
 
 TEST(MergeMoving, WhatMovesInTheSceneStaysThatOfTheReference) {
