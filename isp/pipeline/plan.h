@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,7 +33,8 @@ struct DevelopPlan {
   std::optional<Framing> framing;    // set: a part of the image is kept, or it is shrunk
   std::optional<double> sharpen_px;  // set: sharpened for this blur; requested, and the noise is known
   bool local_tone_by_noise = false;  // local tone was requested, and the noise that limits it is known
-  double saturation = 1;    // fraction of white at which the sensor saturates; measured where highlights are rebuilt
+  /// Fractions of white at which R, G and B saturate; measured where highlights are rebuilt.
+  std::array<double, 3> saturation{1, 1, 1};
   bool from_codes = false;  // result of renders_from_codes
   DarkCharge dark;
   std::vector<std::string> warnings;

@@ -202,7 +202,7 @@ Camera with_highlights(Camera camera, const DevelopPlan& plan, Executor& executo
   if (plan.options.highlights != isp::Highlights::reconstruct) return camera;
   Image& image = camera.rgb;
   std::array<float, 3> saturation = plan.rendering.white_gain;
-  for (float& channel : saturation) channel *= static_cast<float>(plan.saturation);
+  for (std::size_t c = 0; c < 3; ++c) saturation[c] *= static_cast<float>(plan.saturation[c]);
   SceneLinear planes = planes_of(image);
   isp::reconstruct_highlights(planes.view(), saturation, executor);
   for (std::size_t i = 0; i < image.pixel.size(); ++i) {

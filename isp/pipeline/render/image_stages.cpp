@@ -69,7 +69,7 @@ Size size_of(const RgbInput& in) {
 /// Returns the white-balanced camera RGB of a saturated pixel.
 std::array<float, 3> saturation_of(const DevelopPlan& plan) {
   std::array<float, 3> out = plan.rendering.white_gain;
-  for (float& channel : out) channel *= static_cast<float>(plan.saturation);
+  for (std::size_t c = 0; c < 3; ++c) out[c] *= static_cast<float>(plan.saturation[c]);
   return out;
 }
 
