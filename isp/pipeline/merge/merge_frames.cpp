@@ -34,7 +34,14 @@ void add_up(std::vector<StageTime>& times) {
 
 /// Checks what the options demand of the frames.
 Result<void> check_drizzling(const MergeContext& work) {
-  if (!work.options.drizzle || work.out.alignment != MergeAlignment::none || work.out.bracket) return {};
+  if (!work.options.drizzle) return {};
+  if (work.loader.reference().raw.layout != SensorLayout::bayer) {
+    return fail(
+        ErrorCode::unsupported,
+        "drizzling measures the three colours of a mosaic, and the frame is monochrome: merge without drizzling",
+        work.loader.reference_name());
+  }
+  if (work.out.alignment != MergeAlignment::none || work.out.bracket) return {};
   return fail(ErrorCode::invalid_argument,
               work.count == 1
                   ? "drizzling needs several frames"
