@@ -10,9 +10,9 @@ PictureSize picture_size(const RawDn& raw, const DevelopOptions& options) {
 Result<void> check_options(const DevelopOptions& o) {
   const bool needs_float = o.space == OutputSpace::camera || o.space == OutputSpace::xyz;
   if (needs_float && o.samples != SampleType::f32) {
-    return fail(
-        ErrorCode::invalid_argument,
-        "camera RGB and XYZ are signed and reach above 1: they need float samples, TIFF with --bits 32 or OpenEXR");
+    return fail(ErrorCode::invalid_argument,
+                "camera RGB and XYZ are signed and reach above 1: they need float samples: PFM, OpenEXR or TIFF with "
+                "--bits 32");
   }
   if (o.samples == SampleType::f32 && (!is_linear(o.space) || o.tone != ToneCurve::none)) {
     return fail(ErrorCode::invalid_argument,

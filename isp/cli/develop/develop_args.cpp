@@ -128,7 +128,9 @@ Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
   add_batch(app, "what was decided for each file, and why", args);
   Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
   if (args.options.denoise.mode == isp::DenoiseChoice::Mode::off && std::holds_alternative<DevelopArgs>(parsed)) {
-    return refuse(app, "--denoise off leaves nothing to do: name a level, or auto");
+    return refuse(
+        app,
+        "--denoise off is for develop: the raw files that this command writes are denoised; name a level, or auto");
   }
   return parsed;
 }
