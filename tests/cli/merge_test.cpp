@@ -153,7 +153,7 @@ TEST_F(MergeCommand, OptionsOfTheImageDoNotChangeHowFramesAreMerged) {
   EXPECT_GT(count, 2.5);
   ASSERT_EQ(lowlux({"merge", "-o", file("merged.dng"), develop[4], develop[5], develop[6], develop[7]}).exit_code, 0);
   const auto alone = lowlux({"develop", file("merged.dng"), "-o", file("other.png"), "--denoise", "standard"});
-  EXPECT_EQ(alone.err, "") << "interpolation leaves less noise on fine scales, which is no reason for a warning";
+  EXPECT_EQ(alone.err, "") << "interpolation leaves less noise on fine scales, which does not call for a warning";
   const std::vector<std::vector<std::string>> changes{{"--crop", "51,50,203,151"},
                                                       {"--max-size", "100"},
                                                       {"--saturation", "1.2"},
