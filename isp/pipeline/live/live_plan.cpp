@@ -277,8 +277,9 @@ Result<void> LivePlanner::set_rendering(const LiveFacts& facts, RawFrame& frame)
   }
   std::optional<WhitePoint> white = out.white;
   // A matrix to the image's primaries states colours relative to its white, not to the light of the scene.
-  if (!white && facts.colour_matrix && frame.raw.layout != SensorLayout::monochrome)
+  if (!white && facts.colour_matrix && frame.raw.layout != SensorLayout::monochrome) {
     white = WhitePoint{.xy = output_white, .cct_k = d65_k};
+  }
   Result<std::optional<LookPlan>> look = plan_look(
       frame, {blocks_, noise_std, white, out.exposure_ev, *balanced, 0, thumbnail_.light_range}, plan_.options);
   if (!look) return tl::make_unexpected(std::move(look.error()));

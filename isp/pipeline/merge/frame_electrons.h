@@ -25,8 +25,7 @@ struct FrameElectrons {
   PerSite<double> common_variance_e2{};  // of the subtracted dark frame, which frames of one exposure share
   std::array<double, 3> saturation_e{};  // signal from which on a site of R, G, B is saturated
   PerSite<double> light_at_white_e{};
-  Plane<float>
-      gain;  // that corrects the lens's shading at each pixel, as the frame states it; empty: none, or not wanted
+  Plane<float> gain;  // that corrects the shading of the lens at each pixel; empty: none is stated, or not wanted
   std::vector<std::string> warnings;
 };
 
