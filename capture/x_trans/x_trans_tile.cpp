@@ -17,7 +17,8 @@ constexpr std::array<float, 9> gaussian{0.0076143F, 0.0360740F, 0.1095866F, 0.21
                                         0.2134430F, 0.1095866F, 0.0360740F, 0.0076143F};
 constexpr float least_ratio_mean = 0.004F, least_root = 0.002F;
 constexpr float least_knee = 0.002F;
-constexpr int saturated_reach = 5;  // of a saturated site: the filters' reach, and two pixels of a lamp's edge
+constexpr float noise_below_zero = 5;  // standard deviations
+constexpr int saturated_reach = 5;     // of a saturated site: the filters' reach, and two pixels of a lamp's edge
 static_assert(saturated_reach >= reach && saturated_reach < margin);
 
 using Lanes = std::array<float, lanes>;
@@ -106,6 +107,7 @@ Tile::Tile(const XTransSetting& setting)
   luma_scale_ = static_cast<float>(scale);
   luma_offset_ = static_cast<float>(offset);
   knee_ = least_knee + luma_scale_ + std::sqrt(luma_offset_);
+  least_value_ = -noise_below_zero * std::sqrt(luma_offset_);
   ratio_floor_ = least_ratio_mean + 2 * luma_scale_;
   root_offset_ = least_root + 0.375F * luma_scale_;
   if (scale > 0) root_offset_ += static_cast<float>(std::min(offset / scale, 1.0));
@@ -191,16 +193,13 @@ void Tile::mark_saturated() {
   const auto& bank = filter_bank();
   constexpr int first = margin - saturated_reach, width = 2 * saturated_reach + 1;
   std::fill_n(near_saturated_.data(), near_saturated_.size(), std::uint8_t{0});
-  bool any = false;
   for (int y = first; y < padded - first; ++y) {
     for (int x = first; x < padded - first; ++x) {
       if (samples_.row(y)[x] < white_[static_cast<std::size_t>(bank[site_at(x, y)].own)]) continue;
-      any = true;
       for (int dy = -saturated_reach; dy <= saturated_reach; ++dy)
         std::fill_n(near_saturated_.row(y + dy) + x - saturated_reach, width, std::uint8_t{1});
     }
   }
-  if (any) compress_samples();
 }
 
 void Tile::compress_samples() {
@@ -210,12 +209,13 @@ void Tile::compress_samples() {
     for (int x = margin - reach; x < padded - margin + reach; ++x)
       to[x] = std::asinh(std::min(from[x], least_white_) / (2 * knee_));
   }
+  is_compressed_ = true;
 }
 
-Tile::Range Tile::range_of(std::size_t colour, int x, int y) const {
+Tile::Range Tile::range_of(std::size_t colour, int x, int y, int distance) const {
   Range range;
-  for (int j = y - 1; j <= y + 1; ++j) {
-    for (int i = x - 1; i <= x + 1; ++i) {
+  for (int j = y - distance; j <= y + distance; ++j) {
+    for (int i = x - distance; i <= x + distance; ++i) {
       if (static_cast<std::size_t>(filter_bank()[site_at(i, j)].own) != colour) continue;
       range.low = std::min(range.low, samples_.row(j)[i]);
       range.high = std::max(range.high, samples_.row(j)[i]);
@@ -224,24 +224,32 @@ Tile::Range Tile::range_of(std::size_t colour, int x, int y) const {
   return range;
 }
 
-float Tile::compressed_value(const PlacedFilters& filters, const Base& base, int x, int y) const {
+float Tile::compressed_value(const PlacedFilters& filters, const Base& base, int x, int y) {
+  if (!is_compressed_) compress_samples();
   Patch patch;
   for (int r = 0; r < side; ++r) std::copy_n(compressed_.row(y + r - reach) + x - reach, lanes, &patch[r * lanes]);
   return 2 * knee_ * std::sinh(filtered(filters, base, patch));
 }
 
-float Tile::value_near_saturation(const PlacedFilters& filters, const Base& base, const Patch& patch,
-                                  std::size_t colour, int x, int y) const {
-  const Range range = range_of(colour, x, y);
+float Tile::value_near_saturation(const PlacedFilters& filters, const Base& base, float value, std::size_t colour,
+                                  int x, int y) {
+  const Range range = range_of(colour, x, y, 1);
   if (range.low < least_white_) {
-    const float value = compressed_value(filters, base, x, y);
-    if (value < least_white_) return value;
+    const float compressed = compressed_value(filters, base, x, y);
+    if (compressed < least_white_) return compressed;
   }
-  const float value = ratio_[colour].row(y)[x] * filtered(filters, base, patch);
   return range.high >= white_[colour] ? std::clamp(value, range.low, range.high) : value;
 }
 
-void Tile::write_pixel(int x, int y, float* rgb) const {
+float Tile::value_at(const PlacedFilters& filters, const Base& base, const Patch& patch, std::size_t colour, int x,
+                     int y) {
+  const float value = ratio_[colour].row(y)[x] * filtered(filters, base, patch);
+  if (near_saturated_.row(y)[x] != 0) return value_near_saturation(filters, base, value, colour, x, y);
+  const bool implausible = value < least_value_ && range_of(colour, x, y, reach).low >= least_value_;
+  return implausible ? compressed_value(filters, base, x, y) : value;
+}
+
+void Tile::write_pixel(int x, int y, float* rgb) {
   const SiteFilters& site = filter_bank()[site_at(x, y)];
   const float mean = tensor_[3].row(y)[x];
   const float noise = noise_of_trace * (luma_scale_ * mean + luma_offset_) / (4 * (mean + root_offset_));
@@ -251,10 +259,7 @@ void Tile::write_pixel(int x, int y, float* rgb) const {
   rgb[own] = samples_.row(y)[x] * neutral_[own];
   for (std::size_t slot = 0; slot < 2; ++slot) {
     const auto target = static_cast<std::size_t>(site.target[slot]);
-    const float value = near_saturated_.row(y)[x] != 0
-                            ? value_near_saturation(site.colour[slot], base, patch, target, x, y)
-                            : ratio_[target].row(y)[x] * filtered(site.colour[slot], base, patch);
-    rgb[target] = value * neutral_[target];
+    rgb[target] = value_at(site.colour[slot], base, patch, target, x, y) * neutral_[target];
   }
 }
 
@@ -268,6 +273,7 @@ void Tile::run(int x, int y, PlaneView<float> out) {
   compute_luma();
   compute_tensor();
   mark_saturated();
+  is_compressed_ = false;
   for (int j = 0; j < out.height; ++j) {
     for (int i = 0; i < out.width / 3; ++i) write_pixel(margin + i, margin + j, out.row(j) + 3 * i);
   }

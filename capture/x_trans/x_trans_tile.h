@@ -42,29 +42,34 @@ class Tile {
   void compute_luma();
   void compute_tensor();
   void mark_saturated();
-  void write_pixel(int x, int y, float* rgb) const;
+  void write_pixel(int x, int y, float* rgb);
   /// The range of the sites of a colour.
   struct Range {
     float low = INFINITY, high = -INFINITY;
   };
-  /// Returns the range of the sites of a colour within one pixel.
-  Range range_of(std::size_t colour, int x, int y) const;
+  /// Returns the range of the sites of a colour in the square that reaches `distance` pixels to each side.
+  Range range_of(std::size_t colour, int x, int y, int distance) const;
   /// Computes asinh(v / (2 knee)) of the samples v around the core, clipped to the level up to which no colour
   /// saturates: a logarithm well above the knee, and linear in noise around zero.
   void compress_samples();
   /// Interpolates compressed samples. The ratios of colours are constants there, which the filters keep.
-  float compressed_value(const PlacedFilters& filters, const Base& base, int x, int y) const;
+  float compressed_value(const PlacedFilters& filters, const Base& base, int x, int y);
   /// Interpolates close to a saturated site: from compressed samples, so that edges of saturated regions are alike in
-  /// all colours and a lamp does not shine into its dark surroundings; and from all there is where that gives a value
-  /// beyond the clipping level.
-  float value_near_saturation(const PlacedFilters& filters, const Base& base, const Patch& patch, std::size_t colour,
-                              int x, int y) const;
+  /// all colours and a lamp does not shine into its dark surroundings. Where that gives a value beyond the clipping
+  /// level, it is `value`, which was interpolated from all there is.
+  float value_near_saturation(const PlacedFilters& filters, const Base& base, float value, std::size_t colour, int x,
+                              int y);
+  /// Interpolates a colour. A value further below zero than noise explains, where no sample is, is next to a lamp that
+  /// does not saturate: it is interpolated from compressed samples too.
+  float value_at(const PlacedFilters& filters, const Base& base, const Patch& patch, std::size_t colour, int x, int y);
 
   XTransSetting setting_;
   std::array<float, 3> neutral_{}, white_{};  // relative to green; white over neutral
   float luma_scale_ = 0, luma_offset_ = 0;    // noise of luma
   float least_white_ = INFINITY;
   float ratio_floor_ = 0, root_offset_ = 0, knee_ = 0;
+  float least_value_ = 0;                                         // that noise explains where it is dark
+  bool is_compressed_ = false;                                    // the tile that is run
   std::array<std::size_t, padded> row_sites_{}, column_sites_{};  // whose sum is the number of a site
   Plane<float> samples_, luma_, compressed_;
   std::array<Plane<float>, 3> ratio_;     // by which samples of each colour are divided around a site

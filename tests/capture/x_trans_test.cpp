@@ -215,10 +215,11 @@ struct Lamp {
   }
 };
 
-Lamp drawn_lamp(std::mt19937& draw) {
+Lamp drawn_lamp(std::mt19937& draw, double least_brightness, double largest_brightness) {
   const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(draw); };
   Lamp lamp{20 + uniform(0, 6), 20 + uniform(0, 6), uniform(1, 2.5), {}, {}};
-  const double brightness = std::exp(uniform(std::log(3), std::log(30))), dark = uniform(0.01, 0.04);
+  const double brightness = std::exp(uniform(std::log(least_brightness), std::log(largest_brightness))),
+               dark = uniform(0.01, 0.04);
   for (std::size_t c = 0; c < 3; ++c) {
     lamp.peak[c] = brightness * uniform(0.3, 1);
     lamp.ground[c] = dark * uniform(0.3, 1);
@@ -233,7 +234,7 @@ TEST(XTrans, SaturatedLampsKeepTheirColourAndThatOfTheirDarkSurroundings) {
   std::mt19937 draw(seed);
   double sum = 0, squares = 0, lowest = INFINITY;  // of |ln(value / truth)|; of value / truth
   for (int i = 0; i < lamps; ++i) {
-    const Lamp lamp = drawn_lamp(draw);
+    const Lamp lamp = drawn_lamp(draw, 3, 30);
     const XTransPhase phase = phase_number(i % 36);
     const auto truth = [&](int x, int y, int c) { return std::min(lamp.at(x, y, c), 1.0); };
     const auto out = interpolated(mosaic_of(side, side, phase, truth), {phase});
@@ -261,6 +262,18 @@ TEST(XTrans, SaturatedLampsKeepTheirColourAndThatOfTheirDarkSurroundings) {
   RecordProperty("mean_error", std::to_string(mean));
   EXPECT_LT(mean, 0.04 + 5 * standard_error);  // 0.031 when this was written
   EXPECT_GT(lowest, 0);                        // no dark dots
+}
+
+TEST(XTrans, LampsThatDoNotSaturateLeaveNoDarkDots) {
+  constexpr int side = 46, lamps = 200;
+  std::mt19937 draw(11);
+  for (int i = 0; i < lamps; ++i) {
+    const Lamp lamp = drawn_lamp(draw, 0.1, 0.95);
+    const XTransPhase phase = phase_number(i % 36);
+    const auto out =
+        interpolated(mosaic_of(side, side, phase, [&](int x, int y, int c) { return lamp.at(x, y, c); }), {phase});
+    for (std::size_t k = 0; k < out.size(); ++k) ASSERT_GT(out.data()[k], 0) << "lamp " << i << " at " << k;
+  }
 }
 
 /// A flat of Poisson noise and read noise [e-], as fractions of 1000 e-.
