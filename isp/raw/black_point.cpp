@@ -34,7 +34,11 @@ double site_mean(const BlackLevel& tag, int site) {
       sum += tag.pattern_dn[(y * tag.columns + x) * tag.samples + sample];
     }
   }
-  return sum / n + mean_offset(tag.column_dn, site & 1) + mean_offset(tag.row_dn, site >> 1);
+  const auto offset = [rgb](const std::vector<double>& offsets, int parity) {
+    return rgb ? (mean_offset(offsets, 0) + mean_offset(offsets, 1)) / 2
+               : mean_offset(offsets, static_cast<std::size_t>(parity));
+  };
+  return sum / n + offset(tag.column_dn, site & 1) + offset(tag.row_dn, site >> 1);
 }
 
 bool four_figures_do(const BlackLevel& tag) {
@@ -119,6 +123,10 @@ MaskedBlack masked_black_of(const RawFrame& frame) {
 double white_at(const RawDn& raw, int site) {
   if (raw.layout != SensorLayout::bayer) return raw.white_dn[std::min(site, 2)];
   return raw.white_dn[static_cast<int>(colour_at(raw.phase, site & 1, site >> 1))];
+}
+
+double mean_pedestal_dn(const BlackPoint& black) {
+  return (black.pedestal_dn[0] + black.pedestal_dn[1] + black.pedestal_dn[2] + black.pedestal_dn[3]) / 4;
 }
 
 double mean_range_dn(const RawDn& raw, const BlackPoint& black) {

@@ -30,14 +30,18 @@ Rect whole_of(const RawDn& raw) { return {0, 0, raw.active.width, raw.active.hei
          part.y + part.height <= raw.active.height && out.width == part.width && out.height == part.height;
 }
 
-// Subtracts the pattern of a tag that four figures cannot express; white stays that of the site.
+// Scales a sample above a black level of its own by the range of its plane, since photosites have one gain whatever
+// their black is (DNG 1.7, chapter 5). A saturated sample has lost its black level.
+float scaled(double dn, double black_dn, double mean_black_dn, double white_dn) {
+  return static_cast<float>((dn - (dn >= white_dn ? mean_black_dn : black_dn)) / (white_dn - mean_black_dn));
+}
+
+// Subtracts the pattern of a tag that four figures cannot express.
 template <class Sample>
-void row_by_pattern(const RawDn& raw, const Sample* dn, const BlackLevel& pattern, const Rect& part, int y,
-                    float* out) {
-  for (int x = 0; x < part.width; ++x) {
-    const double black = pattern.at(part.x + x, part.y + y);
-    out[x] = static_cast<float>((dn[x] - black) / (white_at(raw, site_of(x, y)) - black));
-  }
+void row_by_pattern(const RawDn& raw, const Sample* dn, const BlackPoint& black, const Rect& part, int y, float* out) {
+  const double mean_black_dn = mean_pedestal_dn(black);
+  for (int x = 0; x < part.width; ++x)
+    out[x] = scaled(dn[x], black.pattern->at(part.x + x, part.y + y), mean_black_dn, white_at(raw, site_of(x, y)));
 }
 
 template <class Sample>
@@ -58,7 +62,7 @@ void row_of(const RawDn& raw, const BlackPoint& black, const SiteScale& scale, c
   with_samples(raw, [&](const auto& samples) {
     const auto* const dn = samples.row(raw.active.y + part.y + y) + raw.active.x + part.x;
     if (black.pattern) {
-      row_by_pattern(raw, dn, *black.pattern, part, y, out);
+      row_by_pattern(raw, dn, black, part, y, out);
     } else {
       row_by_site(dn, scale, part.width, y, out);
     }
@@ -107,7 +111,7 @@ void to_fraction_rgb(const RawDn& raw, const BlackPoint& black, const Rect& part
     float* row = out[c].row(y);
     for (int x = 0; x < part.width; ++x) {
       const double level = black.pattern ? black.pattern->at(part.x + x, part.y + y, c) : black.pedestal_dn[c];
-      row[x] = static_cast<float>((dn[3 * x + c] - level) / (raw.white_dn[c] - level));
+      row[x] = scaled(dn[3 * x + c], level, black.pedestal_dn[c], raw.white_dn[c]);
     }
   };
   for_each_band(executor, part.height, [&](RowBand band, int) {

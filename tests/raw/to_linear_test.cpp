@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cstring>
+#include <vector>
 
 #include "isp/raw/black_point.h"
 #include "tests/support/executors.h"
@@ -57,7 +60,44 @@ TEST(ToFraction, FourByFourPatternsAndRowOffsetsReachEveryPixel) {
   for (int y = 0; y < 7; ++y) {
     for (int x = 0; x < 9; ++x) {
       const double b = 100 + 4 * (y % 4) + x % 4 + y;
-      EXPECT_NEAR(out.value.at(x, y), (1000 - b) / (4095 - b), 1e-6);
+      // The mean of the pattern, and of the offsets of rows, of which even and odd ones count as much.
+      const double mean = 100 + 7.5 + ((0 + 2 + 4 + 6) / 4.0 + (1 + 3 + 5) / 3.0) / 2;
+      EXPECT_NEAR(out.value.at(x, y), (1000 - b) / (4095 - mean), 1e-6);
+    }
+  }
+}
+
+TEST(ToFraction, RowsOfOtherBlacksHaveOneGainAndSaturateAtWhite) {
+  for (const SensorLayout layout : {SensorLayout::bayer, SensorLayout::linear_rgb}) {
+    for (const bool alternating : {false, true}) {  // as two converters leave it
+      const int samples = layout == SensorLayout::bayer ? 1 : 3;
+      RawDn raw;
+      raw.layout = layout;
+      raw.active = {0, 0, 4, 8};
+      raw.white_dn = {2000, 2000, 2000};
+      raw.black_tag = BlackLevel{.samples = samples, .pattern_dn = std::vector<double>(samples, 100)};
+      for (int y = 0; y < 8; ++y) raw.black_tag->row_dn.push_back(alternating ? 350 * (y % 2) : 50 * y);
+      const double range = 1900 - 175;  // the mean of the offsets
+      for (const int signal : {-20, 0, 300, 5000}) {
+        raw.dn = Plane<std::uint16_t>(4 * samples, 8);
+        for (int y = 0; y < 8; ++y) {
+          const double code = std::min(100 + raw.black_tag->row_dn[y] + signal, 2000.0);
+          for (int x = 0; x < 4 * samples; ++x) raw.dn.at(x, y) = static_cast<std::uint16_t>(code);
+        }
+        const BlackPoint black = *choose_black(raw, {BlackChoice::metadata});
+        std::array<Plane<float>, 3> planes{{{4, 8}, {4, 8}, {4, 8}}};
+        if (samples == 1) {
+          planes[0] = to_fraction(raw, black, one_thread).value;
+        } else {
+          to_fraction_rgb(raw, black, {planes[0].view(), planes[1].view(), planes[2].view()}, one_thread);
+        }
+        for (int c = 0; c < samples; ++c) {
+          for (int y = 0; y < 8; ++y) {
+            const double expected = signal < 1000 ? signal / range : 1;
+            for (int x = 0; x < 4; ++x) EXPECT_FLOAT_EQ(planes[c].at(x, y), static_cast<float>(expected)) << c << y;
+          }
+        }
+      }
     }
   }
 }

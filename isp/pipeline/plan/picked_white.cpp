@@ -43,10 +43,10 @@ struct RegionSums {
     const bool bayer = raw.layout == SensorLayout::bayer;
     const int site = bayer ? site_of(x, y) : sample;
     const int c = bayer ? static_cast<int>(colour_at(raw.phase, x, y)) : sample;
-    const double level =
-        black.pattern ? black.pattern->at(x, y, sample) : black.pedestal_dn[static_cast<std::size_t>(site)];
-    const double white = white_at(raw, site);
-    colour[static_cast<std::size_t>(c)].add((dn - level) / (white - level));
+    const double pedestal = black.pedestal_dn[static_cast<std::size_t>(site)], white = white_at(raw, site);
+    const double level = black.pattern ? black.pattern->at(x, y, sample) : pedestal;
+    const double mean = black.pattern && bayer ? mean_pedestal_dn(black) : pedestal;
+    colour[static_cast<std::size_t>(c)].add((dn - level) / (white - mean));
     saturated += dn >= white;
   }
 };
