@@ -92,11 +92,21 @@ bool is_jpeg(std::span<const std::byte> bytes) {
   return bytes.size() > 2 && bytes[0] == std::byte{0xFF} && bytes[1] == std::byte{0xD8} && bytes[2] == std::byte{0xFF};
 }
 
+/// Returns whether a file begins as BigTIFF, which has offsets of 64 bits.
+bool is_big_tiff(std::span<const std::byte> bytes) {
+  using std::string_view_literals::operator""sv;
+  return text_of(bytes).starts_with("II\x2B\0"sv) || text_of(bytes).starts_with("MM\0\x2B"sv);
+}
+
 /// Returns the error of a file that is not a DNG and that the decoder rejected. JPEG files can hold a raw after the
 /// image, and most raws begin as TIFF: only now is it known that they are ordinary images.
 Error not_decoded(std::span<const std::byte> bytes, Error error) {
   if (is_jpeg(bytes)) return {ErrorCode::unsupported, "this is a JPEG picture, not a raw file", {}};
   if (is_printable(text_of(bytes))) return {ErrorCode::unsupported, "this is text, not a raw file", {}};
+  if (is_big_tiff(bytes)) {
+    return {
+        ErrorCode::unsupported, "this is a BigTIFF file, which is not supported: convert it to a DNG below 4 GB", {}};
+  }
   if (error.code == ErrorCode::unsupported && TiffFile::open(bytes)) {
     error.message = "this is a TIFF picture, or a raw file that is damaged or unknown to " + decoder_name();
   }

@@ -136,6 +136,12 @@ std::vector<Format> other_formats() {
           {"DNG, integers of 32 bits", [] { return with(plain(), 258, {32}); }},
           {"DNG, LinearRaw, colour after colour", [] { return with(plain(3), 284, {2}); }},
           {"Kodak C603, YCbCr without a header", [] { return dump(9116448); }},
+          {"BigTIFF",
+           [] {
+             std::vector<std::byte> file = dump(1000);
+             for (const int at : {0, 1, 2, 3}) file[at] = std::byte{static_cast<unsigned char>("II\x2B\0"[at])};
+             return file;
+           }},
           {"text", [] { return dump(1000); }},
           {"TIFF image", [] { return with(plain(3).remove(50706).remove(50707), 262, {2}); }}};
 }
