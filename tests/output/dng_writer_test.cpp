@@ -171,6 +171,24 @@ TEST(DngWriter, ASinglePixelIsAFileOfOneSample) {
   }
 }
 
+TEST(DngWriter, TheRepeatOfBlackIsStatedUnlessItIsTheDefault) {
+  const ScratchDirectory scratch;
+  for (const bool repeats : {false, true}) {
+    RawFrame frame = plain_frame(50, 41, repeats ? SensorLayout::bayer : SensorLayout::linear_rgb);
+    if (repeats) frame.raw.black_tag = BlackLevel{.rows = 2, .columns = 2, .pattern_dn = {1, 2, 3, 4}};
+    ASSERT_TRUE(write_dng(frame, scratch.file("a.dng"), {.overwrite = Overwrite::yes}));
+    TIFF* tiff = TIFFOpen(scratch.file("a.dng").c_str(), "r");
+    ASSERT_NE(tiff, nullptr);
+    const std::uint16_t* repeat = nullptr;
+    EXPECT_EQ(TIFFGetField(tiff, TIFFTAG_BLACKLEVELREPEATDIM, &repeat), repeats ? 1 : 0);
+    std::uint16_t count = 0;
+    const float* levels = nullptr;
+    ASSERT_EQ(TIFFGetField(tiff, TIFFTAG_BLACKLEVEL, &count, &levels), 1);
+    EXPECT_EQ(count, repeats ? 4 : 3);
+    TIFFClose(tiff);
+  }
+}
+
 TEST(DngWriter, StripsAreAboutOneMegabyteAndAdjacent) {
   const ScratchDirectory scratch;
   ASSERT_TRUE(write_dng(plain_frame(1000, 1501), scratch.file("a.dng")));

@@ -82,6 +82,11 @@ TEST(CleanPixels, AreWhatDevelopDoes) {
       ASSERT_EQ(clean.raw.is_float(), frame.raw.is_float());
       ASSERT_EQ(clean.raw.active, frame.raw.active);
       const double code = clean.raw.is_float() ? 0 : 1 / (clean.raw.white_dn[0] - clean.raw.black_tag->pattern_dn[0]);
+      if (layout == SensorLayout::linear_rgb && !clean.raw.is_float()) {  // as small as negative samples allow
+        const double black = clean.raw.black_tag->pattern_dn[0];
+        const std::uint16_t least = *std::min_element(clean.raw.dn.data(), clean.raw.dn.data() + clean.raw.dn.size());
+        EXPECT_TRUE(black == 16 || (black > 16 && least <= 17)) << black << ", least code " << least;
+      }
       const auto one = std::get<SceneLinear>(developed(clean, {}).picture);
       const auto two = std::get<SceneLinear>(developed(frame, at(level)).picture);
       for (std::size_t c = 0; c < 3; ++c) {

@@ -88,7 +88,7 @@ std::string description_of(const isp::NoiseReduction& how, const std::optional<N
 
 /// Describes the clean raw of a frame.
 std::string clean_raw_text(const RawDn& from) {
-  const char* const samples = from.is_float() ? "32-bit floats" : "16 bits";
+  const char* const samples = from.is_float() && !from.from_x_trans ? "32-bit floats" : "16 bits";
   if (from.from_x_trans) {
     return fmt::format("LinearRaw DNG of three colours, {}: X-Trans is interpolated when it is read", samples);
   }

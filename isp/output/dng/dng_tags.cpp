@@ -49,7 +49,8 @@ void set_pair(TIFF* tiff, std::uint32_t tag, double first, double second) {
 void set_black(TIFF* tiff, const BlackLevel& black) {
   const std::array<std::uint16_t, 2> repeat{static_cast<std::uint16_t>(black.rows),
                                             static_cast<std::uint16_t>(black.columns)};
-  TIFFSetField(tiff, TIFFTAG_BLACKLEVELREPEATDIM, repeat.data());
+  // 1 x 1 is the default: RawTherapee takes three levels for one if it is stated.
+  if (black.rows != 1 || black.columns != 1) TIFFSetField(tiff, TIFFTAG_BLACKLEVELREPEATDIM, repeat.data());
   set_floats(tiff, TIFFTAG_BLACKLEVEL, black.pattern_dn);
   if (!black.column_dn.empty()) set_floats(tiff, TIFFTAG_BLACKLEVELDELTAH, black.column_dn);
   if (!black.row_dn.empty()) set_floats(tiff, TIFFTAG_BLACKLEVELDELTAV, black.row_dn);

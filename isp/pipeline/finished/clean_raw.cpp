@@ -20,12 +20,6 @@
 namespace lowlux::isp {
 namespace {
 
-/// Returns the levels of the samples of a clean frame.
-/// @param dark_noise  standard deviation of a dark pixel, in fractions of white
-SampleLevels levels_of(const RawDn& raw, double dark_noise) {
-  return raw.is_float() ? float_levels() : code_levels(dark_noise);
-}
-
 /// Returns the standard deviation of a dark pixel of a mosaic in fractions of white, the largest of all sites.
 double dark_noise(const DevelopPlan& plan) {
   const PerSite<double> light_e = light_at_white_e(plan.levels);
@@ -47,7 +41,7 @@ void clean_mosaic(const RawFrame& frame, RawElectrons charge, CleanRaw& out, Sta
   stages.reserve(size_of(whole), how);
   const SignalElectronsView signal = stages.electrons(frame, out.plan, whole, &out.maps);
   clock.lap("denoise");
-  const SampleLevels levels = levels_of(frame.raw, dark_noise(out.plan));
+  const SampleLevels levels = frame.raw.is_float() ? float_levels() : code_levels(dark_noise(out.plan));
   out.frame.raw = encode_signal({.signal_e = signal.value,
                                  .charge_e = stages.charge_e(),
                                  .saturation_e = how.noise.saturation_e,
@@ -94,6 +88,13 @@ Plane<float> interleaved(std::span<const Plane<float>> planes, const PerSite<dou
   return out;
 }
 
+/// Returns the levels of the samples of a clean frame without a mosaic, whose samples are interleaved.
+SampleLevels levels_of(const RawDn& raw, const PixelCharge& charge, const Plane<float>& signal_e) {
+  if (raw.is_float() && !raw.from_x_trans) return float_levels();
+  if (raw.layout == SensorLayout::monochrome) return code_levels(charge.dark_noise);
+  return rgb_code_levels(charge.dark_noise, least_sample(signal_e, charge.at_white_e));
+}
+
 void clean_pixels(const RawFrame& frame, CleanRaw& out, StageClock& clock, Executor& executor) {
   const RawDn& raw = frame.raw;
   const NoiseReduction& how = out.plan.noise_reduction;
@@ -103,7 +104,7 @@ void clean_pixels(const RawFrame& frame, CleanRaw& out, StageClock& clock, Execu
   const std::span<Plane<float>> pixels = stages.pixels(frame, out.plan, &out.maps);
   const Plane<float> signal_e = interleaved(pixels, charge.at_white_e, executor);
   clock.lap("denoise");
-  const SampleLevels levels = levels_of(raw, charge.dark_noise);
+  const SampleLevels levels = levels_of(raw, charge, signal_e);
   out.frame.raw = encode_signal({.signal_e = signal_e.view(),
                                  .charge_e = charge_e.view(),
                                  .saturation_e = charge.saturation_e,

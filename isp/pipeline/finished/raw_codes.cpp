@@ -75,6 +75,26 @@ SampleLevels code_levels(double dark_noise) {
   return {.black_dn = black_dn, .range_dn = most_dn - black_dn};
 }
 
+SampleLevels rgb_code_levels(double dark_noise, double least_sample) {
+  const double below = std::clamp(-least_sample, 0.0, 1.0);
+  const double wanted = below / (1 + below) * most_dn;
+  const double black_dn = std::clamp(16 * std::ceil(wanted / 16), 16.0, code_levels(dark_noise).black_dn);
+  return {.black_dn = black_dn, .range_dn = most_dn - black_dn};
+}
+
+double least_sample(const Plane<float>& samples_e, const PerSite<double>& at_white_e) {
+  std::array<float, 3> least{};
+  for (int y = 0; y < samples_e.height(); ++y) {
+    const float* const row = samples_e.row(y);
+    for (int x = 0; x + 2 < samples_e.width(); x += 3) {
+      for (int c = 0; c < 3; ++c) least[c] = std::min(least[c], row[x + c]);
+    }
+  }
+  double out = 0;
+  for (std::size_t c = 0; c < 3; ++c) out = std::min(out, static_cast<double>(least[c]) / at_white_e[c]);
+  return out;
+}
+
 RawDn encode_signal(const SignalToEncode& signal, const RawDn& like, const SampleLevels& levels, Executor& executor) {
   RawDn out;
   const int samples = like.layout == SensorLayout::linear_rgb ? 3 : 1;

@@ -150,12 +150,15 @@ Result<void> check_drizzle_memory(int width, int height, const merge::DrizzleOpt
 void encode_drizzled(merge::DrizzleImage& image, const merge::DrizzleOptions& options, const CameraRgb& prediction,
                      const FrameElectrons& reference, RawFrame& frame, MergedRaw& out, Executor& executor) {
   const ColourLevels colours = levels_of(reference);
-  const SampleLevels levels = sample_levels(reference, reference.light_at_white_e, out);
   out.frame.noise = profile_of(image, options, colours, out, executor);
-  for (double& offset : out.frame.noise->offset) offset += levels.rounding_variance();
   out.frame.noise->source = frame.noise->source;
   out.empty_fraction = image.empty_fraction;
   const Plane<float> samples = interleaved(image, prediction, executor);
+  const PerSite<double>& site_white_e = reference.light_at_white_e;
+  const SampleLevels codes =
+      rgb_code_levels(dark_noise(reference, site_white_e), least_sample(samples, colours.white_e));
+  const SampleLevels levels = fine_levels(codes, reference, site_white_e, out);
+  for (double& offset : out.frame.noise->offset) offset += levels.rounding_variance();
   image = {};
   RawDn like;
   like.layout = SensorLayout::linear_rgb;

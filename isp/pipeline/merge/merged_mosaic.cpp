@@ -23,17 +23,6 @@ std::size_t colour_of(BayerPhase phase, int site) {
   return static_cast<std::size_t>(colour_at(phase, site & 1, site >> 1));
 }
 
-/// Returns the standard deviation of a dark pixel of one frame in fractions of white, the largest of all sites: where
-/// only one frame matched, its noise must not be clipped.
-double dark_noise(const FrameElectrons& reference, const PerSite<double>& site_white_e) {
-  double noise = 0;
-  for (int site = 0; site < 4; ++site) {
-    const double variance = reference.variance_e2[site] + reference.common_variance_e2[site];
-    noise = std::max(noise, std::sqrt(variance) / site_white_e[site]);
-  }
-  return noise;
-}
-
 /// Returns the smallest variance of a site without light, in fractions of white squared.
 double least_dark_variance(const FrameElectrons& reference, const PerSite<double>& site_white_e,
                            const MergedRaw& merged) {
@@ -49,9 +38,17 @@ double least_dark_variance(const FrameElectrons& reference, const PerSite<double
 
 }  // namespace
 
-SampleLevels sample_levels(const FrameElectrons& reference, const PerSite<double>& site_white_e,
-                           const MergedRaw& merged) {
-  const SampleLevels codes = code_levels(dark_noise(reference, site_white_e));
+double dark_noise(const FrameElectrons& reference, const PerSite<double>& site_white_e) {
+  double noise = 0;
+  for (int site = 0; site < 4; ++site) {
+    const double variance = reference.variance_e2[site] + reference.common_variance_e2[site];
+    noise = std::max(noise, std::sqrt(variance) / site_white_e[site]);
+  }
+  return noise;
+}
+
+SampleLevels fine_levels(const SampleLevels& codes, const FrameElectrons& reference,
+                         const PerSite<double>& site_white_e, const MergedRaw& merged) {
   const bool fine = codes.rounding_variance() < max_rounding * least_dark_variance(reference, site_white_e, merged);
   return fine ? codes : float_levels();
 }
@@ -191,7 +188,8 @@ void encode_merged(merge::MosaicMean& mean, const FrameElectrons& reference, Pla
   }
   SignalElectrons merged{mean.take_mean(executor), reference.phase};
   const Plane<float>& weight = mean.weight();
-  const SampleLevels levels = sample_levels(reference, site_white_e, out);
+  const SampleLevels levels =
+      fine_levels(code_levels(dark_noise(reference, site_white_e)), reference, site_white_e, out);
   if (out.bracket) {
     mark_saturated(merged.value, weight, saturated, site_white_e, executor);
     out.frame.noise = residual_profile(merged, site_variance(weight, reference.phase, executor), site_white_e,

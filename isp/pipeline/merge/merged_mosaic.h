@@ -9,10 +9,14 @@
 
 namespace lowlux::isp {
 
+/// Returns the standard deviation of a dark pixel of one frame in fractions of white, the largest of all sites: where
+/// only one frame matched, its noise must not be clipped.
+double dark_noise(const FrameElectrons& reference, const PerSite<double>& site_white_e);
+
 /// Returns levels of 16-bit codes, or of floating-point samples where rounding to codes would add more than a tenth to
 /// the variance of the darkest sites, as in brackets of many EV and in means of many frames.
-SampleLevels sample_levels(const FrameElectrons& reference, const PerSite<double>& site_white_e,
-                           const MergedRaw& merged);
+SampleLevels fine_levels(const SampleLevels& codes, const FrameElectrons& reference,
+                         const PerSite<double>& site_white_e, const MergedRaw& merged);
 
 /// Smooths gains that were measured for each pixel (flat frames): after displaced frames were averaged, the pixels of
 /// the reference have no response of their own, and what the lens takes away is left. Each gain becomes the mean of
