@@ -105,7 +105,7 @@ std::vector<Format> stored_formats() {
 }
 
 std::vector<Format> other_formats() {
-  return {{"DNG, Bayer, uncompressed, several pieces",
+  return {{"DNG, Bayer, uncompressed, tiles",
            [] {
              DngBuilder dng = plain();
              dng.tile_width = dng.tile_height = 32;

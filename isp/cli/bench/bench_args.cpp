@@ -29,7 +29,7 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
       "run every N-th stage from the I-th on; of methods, if that is the only one, every N-th light (default 1/1: all)",
       args.shard);
   app.add_flag("--calibrate-cost", args.calibrate_cost,
-               "measure the speed of this machine for develop --budget-ms, and store it; 2 to 5 minutes")
+               "measure the speed of this machine for develop --budget-ms, and store it; 3 to 8 minutes")
       ->excludes("--stage")
       ->excludes("--method")
       ->excludes(shard);

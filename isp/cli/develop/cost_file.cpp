@@ -185,7 +185,7 @@ isp::CostModel cost_of_this_machine(int threads, bool quiet) {
   if (!quiet) {
     print_err(fmt::format(
         "{}\n",
-        one_line("lowlux: times are rough estimates until `lowlux bench --calibrate-cost` (2 to 5 minutes) measures "
+        one_line("lowlux: times are rough estimates until `lowlux bench --calibrate-cost` (3 to 8 minutes) measures "
                  "this machine: " +
                  kept.error().message)));
   }

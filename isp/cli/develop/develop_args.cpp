@@ -123,16 +123,10 @@ Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
       ->required()
       ->type_name("CLEAN.dng");
   add_camera(app, args);
-  add_denoise(app, args);
+  add_denoise(app, args, NoiseLevels::at_least_draft);
   add_darks(app, args.dark);
   add_batch(app, "what was decided for each file, and why", args);
-  Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
-  if (args.options.denoise.mode == isp::DenoiseChoice::Mode::off && std::holds_alternative<DevelopArgs>(parsed)) {
-    return refuse(
-        app,
-        "--denoise off is for develop: the raw files that this command writes are denoised; name a level, or auto");
-  }
-  return parsed;
+  return parse_batch(app, words, args);
 }
 
 Parsed<DevelopArgs> parse_merge(const std::vector<std::string>& words) {
@@ -311,11 +305,12 @@ std::optional<std::string> wrong_profiles(const DevelopArgs& args) {
   return std::nullopt;
 }
 
-void add_denoise(CLI::App& app, DevelopArgs& args) {
+void add_denoise(CLI::App& app, DevelopArgs& args, NoiseLevels levels) {
   isp::DenoiseChoice& choice = args.options.denoise;
   using Mode = isp::DenoiseChoice::Mode;
   choice.mode = Mode::automatic;
-  Names<isp::DenoiseChoice> names{{"auto", {.mode = Mode::automatic}}, {"off", {.mode = Mode::off}}};
+  Names<isp::DenoiseChoice> names{{"auto", {.mode = Mode::automatic}}};
+  if (levels == NoiseLevels::off_too) names.emplace("off", isp::DenoiseChoice{.mode = Mode::off});
   for (const denoise::Level level : denoise::all_levels) {
     names.emplace(denoise::name_of(level), isp::DenoiseChoice{Mode::level, level});
   }

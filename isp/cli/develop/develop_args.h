@@ -104,7 +104,10 @@ void add_rendering(CLI::App& app, DevelopArgs& args);
 void add_camera(CLI::App& app, DevelopArgs& args);
 /// Returns the error of the options of add_camera in combination, or nothing.
 std::optional<std::string> wrong_profiles(const DevelopArgs& args);
-void add_denoise(CLI::App& app, DevelopArgs& args);
+/// Lists the levels of noise reduction that a command offers.
+enum class NoiseLevels : std::uint8_t { off_too, at_least_draft };
+/// Adds the options of noise reduction.
+void add_denoise(CLI::App& app, DevelopArgs& args, NoiseLevels levels = NoiseLevels::off_too);
 /// Adds the option of row and column noise.
 void add_line_noise(CLI::App& app, DevelopArgs& args);
 /// Adds the options of dark and bias frames, and those of flat frames.

@@ -259,7 +259,7 @@ void add_budget(CLI::App& app, EffectsArgs& args) {
                "time limit for developing each frame, from decoded codes to a finished image, without reading and "
                "writing files: chooses the most accurate plan that is predicted to fit, or with --tolerance the "
                "fastest within it. Times are rough estimates until bench --calibrate-cost has measured this machine. "
-               "The load of the machine is measured before each file, which takes 0.1 to 0.2 s more. Files are "
+               "The load of the machine is measured before each file, which takes 0.3 to 0.5 s more. Files are "
                "processed one at a time. With --merge the limit includes merging and developing",
                args.budget_ms);
   add_positive(app, "--budget-mpps", "MP_PER_S", "MP/s", "time limit like --budget-ms, in megapixels per second",

@@ -30,7 +30,7 @@ const std::vector<VerbHelp>& raw_verbs() {
       {"info",
        {"--advise", "--json"},
        {"lowlux info night.nef", "lowlux info night.nef --json",
-        "lowlux info --advise --sensor ELD_NikonD850 --luminance 0.1"}},
+        "lowlux info --advise --sensor ELD_NikonD850 --luminance 0.1 --highlight 20x --max-exposure 1"}},
       {"capture",
        {"--list", "--v4l2", "--libcamera", "--output", "--as", "--live", "--exposure-time", "--gain", "--auto-exposure",
         "--frames", "--skip", "--denoise", "--force"},

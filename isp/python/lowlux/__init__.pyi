@@ -240,7 +240,7 @@ def denoise(
     noise: Optional[_Numbers] = ...,
     dark_estimate: Optional[Literal["auto", "off"]] = ...,
     repair: Optional[Literal["auto", "off"]] = ...,
-    denoise: Optional[Literal["auto", "off", "draft", "standard", "high", "best"]] = ...,
+    denoise: Optional[Literal["auto", "draft", "standard", "high", "best"]] = ...,
     line_noise: Optional[Literal["auto", "off"]] = ...,
     chroma_bias: Optional[Literal["least-error", "none"]] = ...,
     dark_frame: Union[_Path, Sequence[_Path], None] = ...,

@@ -58,7 +58,7 @@ def raw_from_array(mosaic, *, black=None, white=None, cfa=None, noise=None, matr
     cfa: "RGGB" (default), "GRBG", "GBRG", "BGGR", or "MONO" for a sensor without filters.
     noise: (scale, offset), or three such pairs for R, G and B: the variance of x, with x = 0 at black and 1 at white, is
         scale * x + offset (DNG NoiseProfile).
-    matrix: 3 x 3, from XYZ to camera RGB (DNG ColorMatrix1); without it a frame is developed to space="camera" only.
+    matrix: 3 x 3, from XYZ to camera RGB (DNG ColorMatrix1); without it colours are those of the camera, with a warning.
     exposure_s, iso: exposure time [s] and ISO setting.
     like: a RawImage of the camera: what is not given here is that of this frame, metadata included. The array has the
         size of its readout or of its visible part.

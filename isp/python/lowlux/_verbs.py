@@ -136,7 +136,7 @@ def merge(raws, output=None, *, overwrite=False, align=None, foreground=None, dr
           dark_doubling=None, flat_frame=None, budget_ms=None):
     """Merge frames of one scene to one with less noise, as `lowlux merge` does with the same options.
 
-    raws: two or more paths or RawImages, which are not changed.
+    raws: paths or RawImages, which are not changed.
     output: DNG to write; None writes nothing.
     align: "auto", "none", "cells", "subpixel" or "stars". mean: "robust" or "plain".
     reference: the path or the RawImage among raws to which the others are aligned.
