@@ -15,12 +15,16 @@ const float* row_of(PlaneView<const float> plane, int y) { return plane.data != 
 
 std::size_t colour_index(BayerPhase phase, int x, int y) { return static_cast<std::size_t>(colour_at(phase, x, y)); }
 
-/// Returns the mean weight of the drops of a frame for R, G and B.
+/// The weights of the drops of a frame for R, G and B.
+struct DropWeights {
+  std::array<float, 3> mean{1, 1, 1};
+  std::array<double, 3> square{1, 1, 1};  // mean square, over the square of the mean
+};
+
 template <class MakeRows>
-std::array<float, 3> mean_weights(const MakeRows& make_rows, BayerPhase phase, int width, int height,
-                                  Executor& executor) {
+DropWeights drop_weights(const MakeRows& make_rows, BayerPhase phase, int width, int height, Executor& executor) {
   struct Sum {
-    std::array<double, 3> weight{}, sites{};
+    std::array<double, 3> weight{}, square{}, sites{};
   };
   std::vector<Sum> sums(static_cast<std::size_t>((height + sampled_rows - 1) / sampled_rows));
   for_each_index(executor, static_cast<int>(sums.size()), [&](int i) {
@@ -29,19 +33,25 @@ std::array<float, 3> mean_weights(const MakeRows& make_rows, BayerPhase phase, i
       const DropRows::Row& row = rows.row(y);
       for (int x = 0; x < width; ++x) {
         if (!(row.weight[x] > 0)) continue;
-        sums[i].weight[colour_index(phase, x, y)] += static_cast<double>(row.weight[x]);
-        sums[i].sites[colour_index(phase, x, y)] += 1;
+        const std::size_t colour = colour_index(phase, x, y);
+        const auto weight = static_cast<double>(row.weight[x]);
+        sums[i].weight[colour] += weight;
+        sums[i].square[colour] += weight * weight;
+        sums[i].sites[colour] += 1;
       }
     }
   });
-  std::array<float, 3> out{1, 1, 1};
+  DropWeights out;
   for (std::size_t c = 0; c < 3; ++c) {
-    double weight = 0, sites = 0;
+    double weight = 0, square = 0, sites = 0;
     for (const Sum& sum : sums) {
       weight += sum.weight[c];
+      square += sum.square[c];
       sites += sum.sites[c];
     }
-    if (sites > 0) out[c] = static_cast<float>(weight / sites);
+    if (!(sites > 0)) continue;
+    out.mean[c] = static_cast<float>(weight / sites);
+    out.square[c] = square * sites / (weight * weight);
   }
   return out;
 }
@@ -54,23 +64,24 @@ void add_placed(PlaneView<const float> placed, const MeanPart& part, MosaicMean&
   });
 }
 
-void add_drops(PlaneView<const float> differences, BayerPhase phase, const Motion& motion,
-               const RgbView<const float>& prediction, double radius_px, const MeanPart& part, MosaicMean& mean,
-               Executor& executor) {
+std::array<double, 3> add_drops(PlaneView<const float> differences, BayerPhase phase, const Motion& motion,
+                                const RgbView<const float>& prediction, double radius_px, const MeanPart& part,
+                                MosaicMean& mean, Executor& executor) {
   const int width = differences.width;
   const auto make_rows = [&] { return DropRows(differences, phase, motion, prediction, radius_px); };
-  const std::array<float, 3> mean_weight = mean_weights(make_rows, phase, width, differences.height, executor);
+  const DropWeights weights = drop_weights(make_rows, phase, width, differences.height, executor);
   for_each_band(executor, differences.height, [&](RowBand band, int) {
     DropRows rows = make_rows();
     std::vector<float> weight(static_cast<std::size_t>(width));
     for (int y = band.first; y < band.last; ++y) {
       const DropRows::Row& row = rows.row(y);
-      const float even = 1 / mean_weight[colour_index(phase, 0, y)], odd = 1 / mean_weight[colour_index(phase, 1, y)];
+      const float even = 1 / weights.mean[colour_index(phase, 0, y)], odd = 1 / weights.mean[colour_index(phase, 1, y)];
       for (int x = 0; x < width; ++x) weight[x] = row.weight[x] * (x % 2 == 0 ? even : odd);
       mean.add_row(y, {.value = row.value.data(), .weight = weight.data(), .site_weight = row_of(part.site_weight, y)},
                    part.block_matches);
     }
   });
+  return weights.square;
 }
 
 }  // namespace lowlux::merge

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "isp/base/executor.h"
@@ -23,8 +24,11 @@ void add_placed(PlaneView<const float> placed, const MeanPart& part, MosaicMean&
 /// Adds differences as drops (DropRows). The weights of each colour are divided by their mean over the frame, so that a
 /// frame counts as one sample for each site, wherever its samples lie.
 /// @param prediction  that the differences were formed with
-void add_drops(PlaneView<const float> differences, BayerPhase phase, const Motion& motion,
-               const RgbView<const float>& prediction, double radius_px, const MeanPart& part, MosaicMean& mean,
-               Executor& executor);
+/// @return of R, G and B, the noise that the frame adds over larger areas: the variance over that of one sample for
+/// each
+///         site, at least 1. Samples whose drops lie between sites count for less, and others for more.
+std::array<double, 3> add_drops(PlaneView<const float> differences, BayerPhase phase, const Motion& motion,
+                                const RgbView<const float>& prediction, double radius_px, const MeanPart& part,
+                                MosaicMean& mean, Executor& executor);
 
 }  // namespace lowlux::merge

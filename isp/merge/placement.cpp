@@ -118,11 +118,14 @@ DropRows::DropRows(PlaneView<const float> differences, BayerPhase phase, const M
       dy_px_(row_.value.size()) {}
 
 const DropRows::Row& DropRows::row(int y) {
+  const auto radius = [&](int x) {
+    return colour_at(phase_, x, y) == CfaColour::green ? radius_ : std::max(radius_, least_red_blue_px);
+  };
   rows::drop_row({samples_of(differences_), red_column(phase_), red_row(phase_)}, displaced(motion_, y, dx_px_, dy_px_),
-                 radius_, row_.value.data(), row_.weight.data());
+                 {radius(0), radius(1)}, row_.value.data(), row_.weight.data());
   add_prediction(prediction_, phase_, y, row_.value);
   const auto per_mean = [&](int x) {
-    return (colour_at(phase_, x, y) == CfaColour::green ? 2.0F : 4.0F) / (radius_ * radius_);
+    return (colour_at(phase_, x, y) == CfaColour::green ? 2.0F : 4.0F) / (radius(x) * radius(x));
   };
   const float even = per_mean(0), odd = per_mean(1);
   for (std::size_t x = 0; x < row_.weight.size(); ++x) row_.weight[x] *= x % 2 == 0 ? even : odd;

@@ -195,8 +195,9 @@ struct Taps {
 };
 
 /// Returns the samples of drops in row `y` where the first lane's place lies in a column and a row of a parity.
-HWY_INLINE Taps taps_of(const Mosaic& mosaic, int y, int column_parity, int row_parity, float radius) {
+HWY_INLINE Taps taps_of(const Mosaic& mosaic, int y, int column_parity, int row_parity, const DropRadius& of) {
   Taps out;
+  const float radius = of.even > of.odd ? of.even : of.odd;
   const int y_from_red = (y ^ mosaic.red_row) & 1, first = radius > 1 ? -1 : 0, last = radius > 1 ? 2 : 1;
   for (int j = first; j <= last; ++j) {
     for (int i = first; i <= last; ++i) {
@@ -214,10 +215,10 @@ struct Tents {
   VF w[4];
 };
 
-HWY_INLINE Tents tents(VF fraction, float per_radius) {
+HWY_INLINE Tents tents(VF fraction, VF per_radius) {
   const auto weight = [=](float place) HWY_ATTR {
     const VF distance = hn::Abs(hn::Sub(constant(place), fraction));
-    return hn::Max(hn::Sub(constant(1), hn::Mul(distance, constant(per_radius))), hn::Zero(Floats()));
+    return hn::Max(hn::Sub(constant(1), hn::Mul(distance, per_radius)), hn::Zero(Floats()));
   };
   return {{weight(-1), weight(0), weight(1), weight(2)}};
 }
@@ -244,11 +245,12 @@ HWY_INLINE DropSums add_taps(const Taps& taps, const MF (&colours)[3], const Ten
   return out;
 }
 
-void DropRow(const Mosaic& mosaic, const DisplacedRow& at, float radius, float* value, float* weight) {
+void DropRow(const Mosaic& mosaic, const DisplacedRow& at, const DropRadius& radius, float* value, float* weight) {
   const Samples& samples = mosaic.samples;
   const MF all = hn::Eq(hn::Zero(Floats()), hn::Zero(Floats()));
   const MF odd = of_floats(hn::Ne(hn::And(hn::Iota(Ints(), 0), whole(1)), whole(0)));
   const MF colours[3] = {hn::Not(odd), odd, all};
+  const VF per_radius = hn::OddEven(constant(1 / radius.odd), constant(1 / radius.even));
   Taps taps[2][2];
   for (int row = 0; row < 2; ++row) {
     for (int column = 0; column < 2; ++column) taps[row][column] = taps_of(mosaic, at.y, column, row, radius);
@@ -256,7 +258,7 @@ void DropRow(const Mosaic& mosaic, const DisplacedRow& at, float radius, float* 
   for_pixels(at, [&](int x, VF dx, VF dy, int count) HWY_ATTR {
     const Ints s32;
     const VF floor_x = hn::Floor(dx), floor_y = hn::Floor(dy);
-    const Tents across = tents(hn::Sub(dx, floor_x), 1 / radius), down = tents(hn::Sub(dy, floor_y), 1 / radius);
+    const Tents across = tents(hn::Sub(dx, floor_x), per_radius), down = tents(hn::Sub(dy, floor_y), per_radius);
     DropSums sums{hn::Zero(Floats()), hn::Zero(Floats())};
     const auto add_group = [&](int first, int line, MI group) HWY_ATTR {
       if (first + lanes() < -1 || first > samples.width || line < -2 || line > samples.height) return;
@@ -293,7 +295,7 @@ void interpolate_row(const Samples& even, const Samples& odd, const DisplacedRow
 void nearest_row(const Samples& samples, const DisplacedRow& at, float* out) {
   HWY_DYNAMIC_DISPATCH(NearestRow)(samples, at, out);
 }
-void drop_row(const Mosaic& mosaic, const DisplacedRow& at, float radius, float* value, float* weight) {
+void drop_row(const Mosaic& mosaic, const DisplacedRow& at, const DropRadius& radius, float* value, float* weight) {
   HWY_DYNAMIC_DISPATCH(DropRow)(mosaic, at, radius, value, weight);
 }
 

@@ -30,12 +30,17 @@ struct Mosaic {
   int red_row;
 };
 
+/// The radii of drops at even and at odd pixels of a row, at most 2 pixels.
+struct DropRadius {
+  float even;
+  float odd;
+};
+
 /// Adds up the samples of the pixels' own colours around their places, weighted by a tent of the distance:
 ///     t = max(1 - |dx| / radius, 0) max(1 - |dy| / radius, 0)
 /// NaN samples do not count.
-/// @param radius  at most 2 pixels
 /// @param value   sum t D / sum t, NaN where the sum of t is 0
 /// @param weight  sum t
-void drop_row(const Mosaic& mosaic, const DisplacedRow& at, float radius, float* value, float* weight);
+void drop_row(const Mosaic& mosaic, const DisplacedRow& at, const DropRadius& radius, float* value, float* weight);
 
 }  // namespace lowlux::merge::rows

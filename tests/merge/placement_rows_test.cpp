@@ -139,10 +139,11 @@ TEST(PlacementRows, DropsAreSumsOverTheirColour) {
   for_cases([](const Case& of) {
     const int red_column = of.width & 1, red_row = of.height & 1;
     const auto colour = [&](int x, int y) { return ((x ^ red_column) & 1) + ((y ^ red_row) & 1); };
-    for (const float radius : {0.5F, 1.0F, 1.5F, 2.0F}) {
+    for (const DropRadius& of_row : {DropRadius{0.5F, 0.5F}, {1, 1.3F}, {1.5F, 0.7F}, {1.5F, 2}, {2, 2}}) {
       std::vector<float> value(of.dx.size()), weight(of.dx.size());
-      drop_row({of.samples(of.with_gaps), red_column, red_row}, of.row(), radius, value.data(), weight.data());
+      drop_row({of.samples(of.with_gaps), red_column, red_row}, of.row(), of_row, value.data(), weight.data());
       for (int x = 0; x < of.width; ++x) {
+        const float radius = x % 2 == 0 ? of_row.even : of_row.odd;
         double sum = 0, weights = 0;
         for (int v = 0; v < of.height; ++v) {
           for (int u = 0; u < of.width; ++u) {

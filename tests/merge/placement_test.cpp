@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -113,14 +114,15 @@ TEST(Placement, DropsAreTheWeightedMeanOfTheirColourAsAPlainSumHasIt) {
   Plane<float> frame = test::noisy_frame(scene, 0, 3, 5, 0);
   frame.at(20, 11) = std::numeric_limits<float>::quiet_NaN();
   for (const BayerPhase phase : {BayerPhase::rggb, BayerPhase::gbrg}) {
-    for (const double radius : {0.5, 1.0, 1.5, 2.0}) {
+    for (const double of_green : {0.5, 1.0, 1.25, 1.5, 2.0}) {
       Motion motion = constant_motion(width, height, 3.3F, -1.6F);
       motion.dx_px.at(1, 0) += 0.9F;
-      DropRows rows(frame.view(), phase, motion, {}, radius);
+      DropRows rows(frame.view(), phase, motion, {}, of_green);
       for (int y = 0; y < height; ++y) {
         const DropRows::Row& row = rows.row(y);
         for (int x = 0; x < width; ++x) {
           const Shift shift = motion.at(static_cast<float>(x), static_cast<float>(y));
+          const double radius = colour_at(phase, x, y) == CfaColour::green ? of_green : std::max(of_green, 4.0 / 3);
           double sum = 0, weight = 0;
           for (int v = 0; v < height; ++v) {
             for (int u = 0; u < width; ++u) {

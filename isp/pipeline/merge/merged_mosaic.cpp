@@ -66,32 +66,46 @@ double variance_of_mean_at(const Plane<float>& weight, int x, int y) {
   return std::min(variance_at(weight, x, y, 1), 1.0);
 }
 
-/// Returns the mean over all sites of the variance over that of one frame; sites that were filled count as one frame.
-double mean_variance(const Plane<float>& weight, Executor& executor) {
-  std::vector<double> of_row(static_cast<std::size_t>(weight.height()));
+/// The variance of the sites of a mean over that of one frame.
+struct MeanVariance {
+  std::array<double, 3> of_colour{};  // mean over the sites of R, G and B
+  double of_all = 1;
+};
+
+/// Returns the mean variance of sites; those that were filled count as one frame. Frames that moved leave more samples
+/// at green sites, which are nearer to each other. A colour without sites has the mean of all.
+MeanVariance mean_variance(const Plane<float>& weight, BayerPhase phase, Executor& executor) {
+  std::vector<PerSite<double>> of_row(static_cast<std::size_t>(weight.height()));
   for_each_index(executor, weight.height(), [&](int y) {
-    double sum = 0;
-    for (int x = 0; x < weight.width(); ++x) {
-      sum += variance_of_mean_at(weight, x, y);
-    }
-    of_row[y] = sum;
+    PerSite<double> sum{};
+    for (int x = 0; x < weight.width(); ++x) sum[site_of(x, y)] += variance_of_mean_at(weight, x, y);
+    of_row[static_cast<std::size_t>(y)] = sum;
   });
-  double sum = 0;
-  for (const double row : of_row) sum += row;
-  return sum / static_cast<double>(weight.size());
+  std::array<double, 3> sum{}, sites{};
+  for (int site = 0; site < 4; ++site) {
+    const std::size_t colour = colour_of(phase, site);
+    for (const PerSite<double>& row : of_row) sum[colour] += row[site];
+    sites[colour] +=
+        static_cast<double>((weight.width() + 1 - (site & 1)) / 2) * ((weight.height() + 1 - (site >> 1)) / 2);
+  }
+  MeanVariance out;
+  out.of_all = (sum[0] + sum[1] + sum[2]) / static_cast<double>(weight.size());
+  for (std::size_t c = 0; c < 3; ++c) out.of_colour[c] = sites[c] > 0 ? sum[c] / sites[c] : out.of_all;
+  return out;
 }
 
-/// Returns the NoiseProfile of a mean of `count` frames. The dark frame is the same for all; frames that moved have
-/// other sites of it.
-NoiseProfile profile_of_mean(const FrameElectrons& reference, const MergedRaw& merged) {
+/// Returns the NoiseProfile of a mean of frames. The dark frame is the same for all; frames that moved have other sites
+/// of it.
+NoiseProfile profile_of_mean(const FrameElectrons& reference, const std::array<double, 3>& variance,
+                             MergeAlignment alignment) {
   NoiseProfile out;
-  const bool still = merged.alignment == MergeAlignment::none;
+  const bool still = alignment == MergeAlignment::none;
   for (int site = 0; site < 4; ++site) {
     const std::size_t colour = colour_of(reference.phase, site);
     const double share = colour == 1 ? 0.5 : 1, unit = 1 / reference.light_at_white_e[site];
-    const double common = reference.common_variance_e2[site] / (still ? 1 : merged.mean_count);
-    out.scale[colour] += share * unit / merged.mean_count;
-    out.offset[colour] += share * (reference.variance_e2[site] / merged.mean_count + common) * unit * unit;
+    const double common = reference.common_variance_e2[site] * (still ? 1 : variance[colour]);
+    out.scale[colour] += share * unit * variance[colour];
+    out.offset[colour] += share * (reference.variance_e2[site] * variance[colour] + common) * unit * unit;
   }
   return out;
 }
@@ -205,12 +219,16 @@ void encode_merged(merge::MosaicMean& mean, const FrameElectrons& reference, Pla
         },
         executor);
   } else {
-    out.mean_count = 1 / mean_variance(weight, executor);
-    out.frame.noise = profile_of_mean(reference, out);
+    const MeanVariance variance = mean_variance(weight, reference.phase, executor);
+    out.mean_count = 1 / variance.of_all;
+    std::array<double, 3> stated = variance.of_colour;
+    for (std::size_t c = 0; c < 3; ++c) stated[c] *= out.drop_noise[c];
+    out.frame.noise = profile_of_mean(reference, stated, out.alignment);
     for (double& offset : out.frame.noise->offset) offset += levels.rounding_variance();
     out.frame.noise_ratio = noise_ratio(
         weight, [&](int x, int y) { return variance_of_mean_at(weight, x, y); },
-        [&](int, int) { return 1 / out.mean_count; }, executor);
+        [&](int x, int y) { return variance.of_colour[static_cast<std::size_t>(colour_at(reference.phase, x, y))]; },
+        executor);
   }
   out.frame.noise->source = frame.noise->source;
   const PlaneView<const float> signal_e = std::as_const(merged.value).view();

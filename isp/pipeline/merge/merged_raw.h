@@ -74,7 +74,9 @@ struct MergedRaw {
   int reference = 0;
   std::optional<MergePlan> plan;  // set where there is a budget
   std::vector<FrameUse> frames;
-  double mean_count = 0;                   // frames averaged at a site, harmonic mean; 0 for a bracket
+  double mean_count = 0;  // frames averaged at a site, harmonic mean; 0 for a bracket
+  /// Variance over larger areas over that of a mean of so many frames, of R, G and B; brackets do not use it.
+  std::array<double, 3> drop_noise{1, 1, 1};
   int stars = 0;                           // found in the reference, if frames were aligned by stars
   double still_fraction = 0;               // of the blocks, that stand still while the stars move
   std::array<double, 3> empty_fraction{};  // of the pixels of a drizzled image, without data of R, G, B

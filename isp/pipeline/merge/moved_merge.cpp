@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,8 +27,8 @@ constexpr double noticeable_gaps = 1e-3;     // of the pixels of a drizzled imag
 constexpr double predicted_error_px = 0.35;  // error of a predicted difference, as a displacement
 
 /// Returns the radius of the drops of so many frames with a signal-to-noise ratio: 1.5 px until frames x ratio^2 is
-/// 256, as sites of red and blue are two pixels apart and stay apart. Above that it falls with the sixth root, at which
-/// noise and blur of a mean over drops in a plane fall alike; to 1 px, so that a drop holds a sample of each colour.
+/// 256. Above that it falls with the sixth root, at which noise and blur of a mean over drops in a plane fall alike; to
+/// 1 px, so that a drop holds a sample of green.
 double drop_radius_px(int frames, double signal_to_noise) {
   const double radius_px = 1.5 * std::sqrt(std::cbrt(256 / (frames * signal_to_noise * signal_to_noise)));
   return std::clamp(std::round(64 * radius_px) / 64, 1.0, 1.5);  // of one value for all math libraries
@@ -48,6 +49,17 @@ void divide(Plane<float>& signal_e, double light, Executor& executor) {
   for_each_index(executor, signal_e.height(), [&](int y) {
     for (int x = 0; x < signal_e.width(); ++x) signal_e.at(x, y) /= static_cast<float>(light);
   });
+}
+
+/// Returns the share of the blocks that count.
+double used_share(PlaneView<const std::uint8_t> block_matches) {
+  if (block_matches.data == nullptr) return 1;
+  double used = 0;
+  for (int y = 0; y < block_matches.height; ++y) {
+    const std::uint8_t* const row = block_matches.row(y);
+    used += static_cast<double>(block_matches.width - std::count(row, row + block_matches.width, std::uint8_t{0}));
+  }
+  return used / (static_cast<double>(block_matches.width) * block_matches.height);
 }
 
 void warn_of_gaps(MergedRaw& out) {
@@ -98,6 +110,8 @@ void MovedMerge::encode() {
     return;
   }
   if (has_robust_reference()) work_.fill_unmatched(*mean_);
+  const double frames = frames_used_ + (has_robust_reference() ? 0 : 1);  // with the reference
+  for (std::size_t c = 0; c < 3 && frames > 0; ++c) work_.out.drop_noise[c] = 1 + excess_noise_[c] / frames;
   if (bracket_) bracket_->fill_unmatched(*mean_);
   encode_merged(*mean_, work_.reference, bracket_ ? bracket_->saturated() : PlaneView<const float>{}, frame, work_.out,
                 work_.executor);
@@ -324,9 +338,12 @@ void MovedMerge::add_matching(const MovedFrame& moved, Plane<std::uint8_t>& matc
 /// Adds the values of a frame as drops: those of stars as they are, others as differences to the prediction.
 void MovedMerge::add_drops(const MovedFrame& moved, const merge::MeanPart& part) {
   if (by_stars()) divide(moved.frame.signal_e, moved.light, work_.executor);
-  merge::add_drops(by_stars() ? std::as_const(moved.frame.signal_e).view() : moved.differences.view(),
-                   work_.reference.phase, moved.motion, by_stars() ? RgbView<const float>{} : expected(),
-                   drop_radius_px_, part, *mean_, work_.executor);
+  const std::array<double, 3> noise = merge::add_drops(
+      by_stars() ? std::as_const(moved.frame.signal_e).view() : moved.differences.view(), work_.reference.phase,
+      moved.motion, by_stars() ? RgbView<const float>{} : expected(), drop_radius_px_, part, *mean_, work_.executor);
+  const double used = used_share(part.block_matches);
+  frames_used_ += used;
+  for (std::size_t c = 0; c < 3; ++c) excess_noise_[c] += used * (noise[c] - 1);
 }
 
 /// Removes the blocks that stand still from those that match. @return those that were removed

@@ -82,9 +82,11 @@ class MovedMerge {
   Plane<std::uint8_t> still_;              // blocks of the foreground: 1; empty: none
   std::optional<merge::MosaicMean> mean_;  // the sum is one of these
   std::optional<merge::Drizzle> drizzle_;
-  Plane<float> differences_, placed_;  // of the frame that is added
-  PerSite<double> level_e_{};          // mean signal, for the weights of drizzling and the size of drops
-  double drop_radius_px_ = 1;          // of stars, which have no prediction; a drop holds a sample of each colour
+  Plane<float> differences_, placed_;     // of the frame that is added
+  PerSite<double> level_e_{};             // mean signal, for the weights of drizzling and the size of drops
+  double frames_used_ = 0;                // as drops, by the share of their blocks that count
+  std::array<double, 3> excess_noise_{};  // sum of what their drops add to the variance, over that of a frame
+  double drop_radius_px_ = 1;             // of stars, which have no prediction; a drop holds a sample of each colour
 };
 
 }  // namespace lowlux::isp

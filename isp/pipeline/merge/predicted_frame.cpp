@@ -78,10 +78,17 @@ Result<CameraRgb> predicted_electrons(merge::MosaicMean mean, const FrameElectro
   // Tiles bound the memory, as the mean is kept in addition to the frame made of it.
   Result<CameraRgb> out = predicted(merged.frame, options_of_mean, {.max_whole_px = max_whole_mean_px}, executor);
   if (!out) return out;
-  // The NoiseProfile of a mean counts as electrons those of all its frames.
-  for (Plane<float>& plane : out->plane) {
+  // The NoiseProfile of a mean counts as electrons those of all its frames, as many as it states for each colour.
+  std::array<double, 3> frame_white_e{};
+  for (int site = 0; site < 4; ++site) {
+    const auto colour = static_cast<std::size_t>(colour_at(reference.phase, site & 1, site >> 1));
+    frame_white_e[colour] += reference.light_at_white_e[site] * (colour == 1 ? 0.5 : 1);
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto scale = static_cast<float>(frame_white_e[c] * merged.frame.noise->scale[c]);
+    Plane<float>& plane = out->plane[c];
     for_each_index(executor, plane.height(), [&](int y) {
-      for (int x = 0; x < plane.width(); ++x) plane.at(x, y) /= static_cast<float>(merged.mean_count);
+      for (int x = 0; x < plane.width(); ++x) plane.at(x, y) *= scale;
     });
   }
   return out;

@@ -21,6 +21,10 @@ MergeOptions by_stars(std::optional<int> reference = 0) {
   return {.alignment = MergeAlignment::stars, .reference = reference};
 }
 
+// Drops are tents, whose variance is a sixth of the radius squared: of radius 1 for green, half of the sites, and 4/3
+// for the others.
+constexpr double variance_of_drops_px2 = (1 + 16.0 / 9) / 2 / 6;
+
 double picture_e(const MergedRaw& merged, int x, int y) { return Burst::signal_e(merged.frame, x, y); }
 
 TEST(MergeStars, KeepFluxAndWidthWhileTheSkyTurns) {
@@ -35,8 +39,8 @@ TEST(MergeStars, KeepFluxAndWidthWhileTheSkyTurns) {
   const auto found = moments_of_stars(sky, burst, 1, [&](int x, int y) { return picture_e(merged, x, y); });
   const auto truth = moments_of_stars(sky, burst, 1, [&](int x, int y) { return burst.truth_e(x, y); });
   EXPECT_NEAR(found.flux_e / truth.flux_e, 1, 0.01);
-  // Drops are tents of radius 1, whose variance is 1/6; the reference, one of twelve, is not spread.
-  EXPECT_NEAR(found.variance_px2 - truth.variance_px2, 11.0 / 12 / 6, 0.04);
+  // The reference, one of twelve, is not spread.
+  EXPECT_NEAR(found.variance_px2 - truth.variance_px2, 11.0 / 12 * variance_of_drops_px2, 0.04);
 }
 
 TEST(MergeStars, NoiseOfTheSkyIsWhatIsStated) {
@@ -68,6 +72,12 @@ TEST(MergeStars, NoiseOfTheSkyIsWhatIsStated) {
   }
   EXPECT_NEAR(sum / n, sky.sky_e, 5 * std::sqrt(variance / 36 / n));
   EXPECT_NEAR(variance / stated, 1, 0.1 + 5 * std::sqrt(2 / n));
+  double of_all = 0;
+  for (const std::size_t c : {0U, 1U, 1U, 2U}) {
+    EXPECT_GT(merged.drop_noise[c], 1.01) << c;
+    of_all += merged.frame.noise->scale[c] * white_e / merged.drop_noise[c] / 4;
+  }
+  EXPECT_NEAR(of_all * merged.mean_count, 1, 1e-3);
 }
 
 TEST(MergeStars, SatellitesAreLeftOutOfTheReferenceToo) {
@@ -115,7 +125,10 @@ TEST(MergeStars, AreAlignedAfterTurnsOfAnyAngle) {
     const auto found = moments_of_stars(sky, burst, 1, [&](int x, int y) { return picture_e(merged, x, y); });
     const auto truth = moments_of_stars(sky, burst, 1, [&](int x, int y) { return burst.truth_e(x, y); });
     EXPECT_NEAR(found.flux_e / truth.flux_e, 1, 0.03) << turn_deg;
-    EXPECT_NEAR(found.variance_px2 - truth.variance_px2, 2.0 / 3 / 6, 0.1) << turn_deg;
+    // After a quarter turn, sites of red and blue lie a pixel beside two of their samples, after a half turn a pixel
+    // each way from four of them, and those of green on theirs or between four that weigh nothing: (0.5 + 1) / 3 / 2.
+    const double spread_px2 = turn_deg == 90 ? 0.25 : 2.0 / 3 * variance_of_drops_px2;
+    EXPECT_NEAR(found.variance_px2 - truth.variance_px2, spread_px2, 0.1) << turn_deg;
   }
 }
 

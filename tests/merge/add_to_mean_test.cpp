@@ -1,0 +1,110 @@
+#include "isp/merge/add_to_mean.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include "tests/merge/merge_scene.h"
+#include "tests/support/executors.h"
+
+namespace lowlux::merge {
+namespace {
+
+/// Returns the displacements of a frame that is turned about the middle of a scene, and shifted.
+Motion turned(int width, int height, double angle, double dx_px, double dy_px) {
+  Motion out = no_motion(width, height);
+  for (int j = 0; j < out.dx_px.height(); ++j) {
+    for (int i = 0; i < out.dx_px.width(); ++i) {
+      const double x = out.spacing_px * i - width / 2.0, y = out.spacing_px * j - height / 2.0;
+      out.dx_px.at(i, j) = static_cast<float>(dx_px - angle * y);
+      out.dy_px.at(i, j) = static_cast<float>(dy_px + angle * x);
+    }
+  }
+  return out;
+}
+
+/// Returns the mean square of the weights of drops over the square of their mean, where displacements are uniform: by
+/// the autocorrelation of the tent, a cubic spline, at the distances of a colour's samples.
+double square_of_weights(double radius_px, bool green) {
+  const auto correlation = [&](int distance_px) {
+    const double d = std::fabs(distance_px) / radius_px;
+    if (d >= 2) return 0.0;
+    return radius_px * (d < 1 ? 2.0 / 3 - d * d + d * d * d / 2 : std::pow(2 - d, 3) / 6);
+  };
+  double sum = 0;
+  for (int j = -4; j <= 4; ++j) {
+    for (int i = -4; i <= 4; ++i) {
+      if (green ? (i + j) % 2 != 0 : i % 2 != 0 || j % 2 != 0) continue;
+      sum += correlation(i) * correlation(j);
+    }
+  }
+  return (green ? 2 : 4) * sum / std::pow(radius_px, 4);
+}
+
+TEST(AddDrops, TheNoiseThatUnequalWeightsAddIsThatOfUniformDisplacements) {
+  EXPECT_NEAR(square_of_weights(1, false), 16.0 / 9, 1e-12);
+  constexpr int side = 400;
+  const Plane<float> frame = test::flat_mosaic(side, side, 0);
+  for (const double radius : {1.0, 1.25, 1.5, 2.0}) {
+    MosaicMean mean(side, side);
+    const auto noise = add_drops(frame.view(), BayerPhase::bggr, turned(side, side, 0.05, 0.3, 0.1), {}, radius, {},
+                                 mean, test::one_thread);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double expected = square_of_weights(c == 1 ? radius : std::max(radius, 4.0 / 3), c == 1);
+      EXPECT_NEAR(noise[c], expected, 0.02) << radius << ", colour " << c;  // drops at the border hold fewer samples
+    }
+  }
+}
+
+// White noise of variance 1 in 12 frames, of whose mean sums over windows of 32 x 32 sites are measured, for each
+// colour apart: their variance over that of one sample for each site and frame is what add_drops returns. Windows
+// overlap by half, so that four of them count as at least two.
+TEST(AddDrops, TheNoiseOfLargerAreasIsAsStated) {
+  constexpr int side = 320, border = 32, window = 32, frames = 12, seeds = 8;
+  const Plane<float> dark = test::flat_mosaic(side, side, 0);
+  std::array<double, window> weight{};
+  for (int i = 0; i < window; ++i) weight[i] = std::pow(std::sin((i + 0.5) / window * std::numbers::pi), 2);
+  for (const double radius : {1.0, 1.5}) {
+    for (const double turn : {0.0, 4e-4}) {
+      SCOPED_TRACE(testing::Message() << "radius " << radius << ", turn " << turn);
+      std::array<double, 3> squares{}, expected{}, stated{};
+      int windows = 0;
+      for (int seed = 0; seed < seeds; ++seed) {
+        MosaicMean mean(side, side);
+        for (int i = 0; i < frames; ++i) {
+          const Plane<float> noise = test::noisy_frame(dark, 0, 1, seed, i);
+          const Motion motion = turned(side, side, turn * (i - 5), 0.37 * i, -0.61 * i);
+          const auto factor =
+              add_drops(noise.view(), BayerPhase::grbg, motion, {}, radius, {}, mean, test::two_threads);
+          for (std::size_t c = 0; c < 3; ++c) stated[c] += factor[c] / (frames * seeds);
+        }
+        const Plane<float> values = mean.take_mean(test::one_thread);
+        for (int top = border; top + window <= side - border; top += window / 2) {
+          for (int left = border; left + window <= side - border; left += window / 2, ++windows) {
+            std::array<double, 3> sum{};
+            for (int y = 0; y < window; ++y) {
+              for (int x = 0; x < window; ++x) {
+                const auto colour = static_cast<std::size_t>(colour_at(BayerPhase::grbg, left + x, top + y));
+                sum[colour] += weight[x] * weight[y] * static_cast<double>(values.at(left + x, top + y));
+                expected[colour] += std::pow(weight[x] * weight[y], 2) / frames;
+              }
+            }
+            for (std::size_t c = 0; c < 3; ++c) squares[c] += sum[c] * sum[c];
+          }
+        }
+      }
+      for (std::size_t c = 0; c < 3; ++c) {
+        EXPECT_NEAR(squares[c] / expected[c] / stated[c], 1, 5 * std::sqrt(2 / (0.5 * windows)) + 0.02)
+            << "colour " << c;
+        EXPECT_GE(stated[c], 1);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lowlux::merge
