@@ -4,7 +4,9 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "capture/dng/dng_colour.h"
 #include "capture/dng/dng_image.h"
@@ -54,6 +56,13 @@ void read_noise_ratio(const DngFile& dng, const TiffDirectory& directory, RawFra
   const Rect& active = frame.raw.active;
   auto ratio = or_ignored(isp::decode_noise_ratio(*bytes, active.width, active.height), frame.warnings);
   if (ratio) frame.noise_ratio = std::make_shared<const NoiseRatio>(*std::move(ratio));
+}
+
+void warn_of_gain_tables(const DngFile& dng, const TiffDirectory& directory, std::vector<std::string>& warnings) {
+  for (const TagName name : {tag::profile_gain_table_map, tag::profile_gain_table_map2}) {
+    if (directory.find(name) == nullptr && dng.main.find(name) == nullptr) continue;
+    warnings.push_back(std::string(name.name) + " is not applied: its maker's image has other local brightness");
+  }
 }
 
 /// Returns the directory with an opcode list: that of the raw image, where DNG requires it, or the first one.
@@ -110,6 +119,7 @@ Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw
   if (auto read = read_levels(raw_image, *image, frame.raw, frame.warnings); !read) return pass_on(read);
   read_colour_and_noise(dng, raw_image, frame);
   read_noise_ratio(dng, raw_image, frame);
+  warn_of_gain_tables(dng, raw_image, frame.warnings);
   return described;
 }
 

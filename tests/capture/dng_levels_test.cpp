@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <numeric>
 #include <string>
+#include <vector>
 
 #include "tests/capture/read_built.h"
 
@@ -37,6 +40,17 @@ TEST(DngLevels, ABlackLevelThatIsNotStatedIsZeroUnlessItCanBeMeasured) {
   masked.set(50829, Tag::numbers(TagType::u32, {0, 4, 64, 64}));
   masked.set(50830, Tag::numbers(TagType::u32, {0, 0, 64, 4}));
   EXPECT_FALSE(read_built(masked).raw.black_tag);
+}
+
+TEST(DngLevels, GainTablesOfTheProfileAreWarnedOf) {
+  for (const std::uint16_t tag : {52525, 52544}) {
+    DngBuilder dng;
+    EXPECT_TRUE(read_built(dng).warnings.empty());
+    dng.set(tag, Tag::opaque(std::vector<std::byte>(98)));
+    const std::vector<std::string> warnings = read_built(dng).warnings;
+    ASSERT_EQ(warnings.size(), 1U);
+    EXPECT_EQ(warnings[0].rfind("ProfileGainTableMap", 0), 0U) << warnings[0];
+  }
 }
 
 TEST(DngLevels, AStatedBlackLevelOfZeroIsPresent) {
