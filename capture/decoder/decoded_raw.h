@@ -35,6 +35,7 @@ struct DecodedHeader {
   std::uint32_t maximum;
   float camera_multiplier[4];  // R, G, B, second G; 0 or less where unknown
   float xyz_to_camera[3][3];   // all 0 where unknown
+  float camera_to_srgb[3][3];  // of white-balanced camera RGB; all 0 where unknown, or known by xyz_to_camera
   std::uint32_t dng_version;
   double pixel_aspect;
   float iso, exposure_s, f_number, focal_length_mm;  // 0 where unknown

@@ -34,6 +34,19 @@ void fill_sizes(const libraw_data_t& data, DecodedHeader& h) {
   for (int i = 0; i < 8; ++i) std::copy_n(sizes.mask[i], 4, h.masks[i]);
 }
 
+/// Fills the matrix of cameras that LibRaw knows by a matrix to sRGB alone. It is the identity where nothing is known.
+void fill_camera_to_srgb(const libraw_colordata_t& colour, DecodedHeader& h) {
+  bool is_identity = true, has_table = false;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      is_identity = is_identity && colour.rgb_cam[i][j] == (i == j ? 1 : 0);
+      has_table = has_table || colour.cam_xyz[i][j] != 0;
+    }
+  }
+  if (is_identity || has_table) return;
+  for (int i = 0; i < 3; ++i) std::copy_n(colour.rgb_cam[i], 3, h.camera_to_srgb[i]);
+}
+
 void fill_colour(const libraw_data_t& data, DecodedHeader& h) {
   const libraw_colordata_t& colour = data.color;
   h.filters = data.idata.filters;
@@ -46,6 +59,7 @@ void fill_colour(const libraw_data_t& data, DecodedHeader& h) {
   h.maximum = colour.maximum;
   std::copy_n(colour.cam_mul, 4, h.camera_multiplier);
   for (int i = 0; i < 3; ++i) std::copy_n(colour.cam_xyz[i], 3, h.xyz_to_camera[i]);
+  fill_camera_to_srgb(colour, h);
 }
 
 void fill_shot(const libraw_data_t& data, DecodedHeader& h) {

@@ -14,6 +14,7 @@
 #include "capture/dng/dng_levels.h"
 #include "capture/file/pass_on.h"
 #include "capture/x_trans/x_trans_frame.h"
+#include "isp/model/colour/colorimetry.h"
 
 namespace lowlux::capture {
 namespace {
@@ -133,19 +134,36 @@ FrameInfo info_of(const DecodedHeader& h) {
   return info;
 }
 
+/// Returns the camera RGB of white as it was shot, at most 1; nullopt where the multipliers are not known.
+std::optional<Vector3> as_shot_neutral(const DecodedHeader& h) {
+  const float* gain = h.camera_multiplier;
+  const bool known = std::all_of(gain, gain + 3, [](float g) { return std::isfinite(g) && g > 0; });
+  if (!known) return std::nullopt;
+  const double least = std::min({gain[0], gain[1], gain[2]});
+  return Vector3{least / gain[0], least / gain[1], least / gain[2]};
+}
+
 CameraColour colour_of(const DecodedHeader& h) {
   CameraColour colour;
   if (const auto calibration = table_calibration(h)) {
     colour.calibrations.push_back(*calibration);
     colour.source = CameraColour::Source::decoder_table;
   }
-  const float* gain = h.camera_multiplier;
-  const bool known = std::all_of(gain, gain + 3, [](float g) { return std::isfinite(g) && g > 0; });
-  if (known) {
-    const double least = std::min({gain[0], gain[1], gain[2]});
-    colour.as_shot_neutral = Vector3{least / gain[0], least / gain[1], least / gain[2]};
-  }
+  colour.as_shot_neutral = as_shot_neutral(h);
   return colour;
+}
+
+/// Returns the matrix of a camera that the decoder knows by one from white-balanced camera RGB to sRGB alone. The white
+/// of the shot is taken for D65.
+std::optional<Matrix3> matrix_by_srgb(const DecodedHeader& h) {
+  Matrix3 to_srgb{};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) to_srgb[i][j] = h.camera_to_srgb[i][j];
+  }
+  const auto neutral = as_shot_neutral(h);
+  const auto from_srgb = inverse(to_srgb), from_xyz = inverse(*isp::rgb_to_xyz(isp::primaries_rec709));
+  if (!neutral || !from_srgb) return std::nullopt;
+  return diagonal3(*neutral) * *from_srgb * *from_xyz;
 }
 
 }  // namespace
@@ -155,7 +173,11 @@ std::optional<ColourCalibration> table_calibration(const DecodedHeader& header) 
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) calibration.xyz_to_camera[i][j] = header.xyz_to_camera[i][j];
   }
-  if (!inverse(calibration.xyz_to_camera)) return std::nullopt;
+  if (!inverse(calibration.xyz_to_camera)) {
+    const auto matrix = matrix_by_srgb(header);
+    if (!matrix || !inverse(*matrix)) return std::nullopt;
+    calibration.xyz_to_camera = *matrix;
+  }
   calibration.cct_k = 6504;  // the table holds Adobe's matrices for D65, as dcraw's adobe_coeff does
   return calibration;
 }

@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "capture/file/dng_source.h"
+#include "isp/model/colour/colorimetry.h"
 
 namespace lowlux::capture {
 namespace {
@@ -133,6 +136,30 @@ TEST(DecoderFrame, TheTableMatrixIsUsedIfItHasAnInverse) {
   ASSERT_EQ(colour.calibrations.size(), 1u);
   EXPECT_EQ(colour.calibrations[0].xyz_to_camera, (0.5 * identity3()));
   EXPECT_EQ(colour.calibrations[0].cct_k, 6504);
+}
+
+// A camera that LibRaw knows by its matrix to sRGB: white-balanced camera RGB becomes XYZ as if it were sRGB of D65.
+TEST(DecoderFrame, AMatrixToSrgbIsUsedWithTheWhiteOfTheShot) {
+  DecodedRaw raw = decoded();
+  const float to_srgb[3][3] = {{1.81F, -0.34F, -0.47F}, {-0.44F, 1.86F, -0.42F}, {-0.68F, -1.39F, 3.07F}};
+  std::copy_n(&to_srgb[0][0], 9, &raw.header.camera_to_srgb[0][0]);
+  for (int i = 0; i < 3; ++i) raw.header.camera_multiplier[i] = 0;
+  DecodedRaw without_white = decoded();
+  without_white.header = raw.header;
+  EXPECT_EQ(frame_of(std::move(without_white)).colour.source, CameraColour::Source::none);
+  const float gain[3] = {1.6F, 1, 1.25F};
+  std::copy_n(gain, 3, raw.header.camera_multiplier);
+  const CameraColour colour = frame_of(std::move(raw)).colour;
+  EXPECT_EQ(colour.source, CameraColour::Source::decoder_table);
+  ASSERT_EQ(colour.calibrations.size(), 1u);
+  EXPECT_EQ(colour.calibrations[0].cct_k, 6504);
+  const Vector3 srgb{0.2, 0.7, 0.4};
+  const Vector3 camera = colour.calibrations[0].xyz_to_camera * (*isp::rgb_to_xyz(isp::primaries_rec709) * srgb);
+  for (int i = 0; i < 3; ++i) {
+    double back = 0;
+    for (int j = 0; j < 3; ++j) back += to_srgb[i][j] * camera[j] * gain[j];
+    EXPECT_NEAR(back, srgb[i], 1e-6);  // float multipliers
+  }
 }
 
 TEST(DecoderFrame, FlipsBecomeOrientations) {
