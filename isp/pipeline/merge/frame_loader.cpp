@@ -60,6 +60,8 @@ Result<std::optional<NoiseProfile>> noise_at_levels(const FrameToMerge& referenc
   return out;
 }
 
+std::string iso_text(const std::optional<double>& iso) { return iso ? fmt::format("{:g}", *iso) : "not stated"; }
+
 /// Returns whether both frames state their noise, and differently: one of them was processed.
 bool noise_differs(const std::optional<NoiseProfile>& expected, const std::optional<NoiseProfile>& noise) {
   const auto is_stated = [](const auto& n) { return n && n->source != NoiseProfile::Source::picture; };
@@ -134,6 +136,14 @@ Result<FrameElectrons> FrameLoader::next() {
                    last_name_));
     }
     frame.noise = *std::move(expected);  // a profile that is measured in an image has an error of its own
+  } else if (!frame.noise) {
+    return tl::make_unexpected(at_frame(
+        {ErrorCode::insufficient,
+         fmt::format("its ISO ({}) is not that of the reference ({}), and the file does not state its noise: give a "
+                     "profile of the camera (--profile, see calibrate noise), or merge frames of one ISO",
+                     iso_text(last_.iso), iso_text(info.iso)),
+         {}},
+        last_name_));
   }
   Result<FrameElectrons> electrons = electrons_of(*read);
   if (!electrons) return tl::make_unexpected(at_frame(electrons.error(), last_name_));

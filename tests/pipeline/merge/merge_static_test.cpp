@@ -107,7 +107,7 @@ TEST(MergeStatic, RefusesFramesThatDoNotFit) {
       {"its mosaic", [](RawFrame& f) { f.raw.phase = BayerPhase::bggr; }},
       {"its noise is not", [](RawFrame& f) { f.noise->scale[1] /= 4; }},
       {"exposure times", [](RawFrame& f) { f.raw.info.exposure_s.reset(); }},
-      {"noise", [](RawFrame& f) { f.noise.reset(), f.raw.info.iso = 100; }},
+      {"its ISO (100) is not that of the reference", [](RawFrame& f) { f.noise.reset(), f.raw.info.iso = 100; }},
   };
   for (const Case& c : cases) {
     for (const int bad : {1, 4}) {
