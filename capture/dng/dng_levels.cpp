@@ -230,8 +230,7 @@ Result<std::optional<std::vector<double>>> read_scale(const TiffDirectory& direc
   return scale;
 }
 
-Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw,
-                         std::vector<std::string>& warnings) {
+Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw) {
   auto white = read_white(directory, image);
   if (!white) return pass_on(white);
   raw.white_dn = *white;
@@ -241,13 +240,9 @@ Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, 
     auto black = read_black(directory, **std::move(stated), raw, image.samples);
     if (!black) return pass_on(black);
     raw.black_tag = *std::move(black);
-  } else if (image.is_float || image.samples > 1 || !raw.masked_is_stated) {
+  } else if (image.is_float || image.samples > 1) {  // DNG's default, which does not hold for the codes of sensors
     raw.black_tag = BlackLevel{.samples = image.samples,
                                .pattern_dn = std::vector<double>(static_cast<std::size_t>(image.samples), 0.0)};
-    if (!image.is_float && image.samples == 1) {
-      warnings.emplace_back(
-          "the file states no black level: 0 is used, DNG's default; if shadows are grey, --black DN states it");
-    }
   }
   return check_levels(raw, "tags WhiteLevel and BlackLevel");
 }

@@ -20,10 +20,8 @@ Result<void> read_geometry(const TiffDirectory& directory, const DngImage& image
 Result<std::optional<std::vector<double>>> read_scale(const TiffDirectory& directory);
 
 /// Reads black and white levels. Precondition: the geometry is filled. White levels not above black are an error. Black
-/// that is not stated is 0, DNG's default, with a warning for codes of a sensor; it is absent if masked areas are stated,
-/// on which it is to be measured.
-Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw,
-                         std::vector<std::string>& warnings);
+/// that is not stated is 0 for floating-point samples and images of three samples, and otherwise absent.
+Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw);
 
 /// Returns the regions of a readout outside its active area, as up to four rectangles that do not overlap.
 std::vector<Rect> borders(int width, int height, const Rect& active);
