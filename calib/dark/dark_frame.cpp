@@ -75,15 +75,13 @@ Result<FrameSetting> check_frames(Groups groups, const RawDn& picture) {
   return setting;
 }
 
-double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
-
 std::vector<DarkLevel> levels_of(const Job& job) {
   std::vector<DarkLevel> out;
   out.reserve(job.groups.size());
   for (std::size_t g = 0; g < job.groups.size(); ++g) {
     const DarkGroup& group = job.groups[g];
     DarkLevel level{{*group.setting.exposure_s, group.setting.temperature_c}, job.frames[g]};
-    level.level_dn = mean_of(job.levels_dn[g]);
+    level.level_dn = mean_of_sites(job.levels_dn[g]);
     for (const DarkSite& site : job.sites[g]) {
       level.variance_dn2 += site.noise_dn2 / (4 * static_cast<double>(group.mean_dn.size()) * job.frames[g]);
     }
@@ -115,10 +113,10 @@ void measure_group(const DarkGroup& group, double per_file, const DarkRequest& r
   PerSite<DarkSite> sites = sites_of(group);
   double gain_dn = per_file * hot_pixel_gain_dn(group, sites), frames = group.frames * per_file;
   if (group.frames == 1 && request.noise) {
-    gain_dn = mean_of(request.noise->gain_dn_per_e);
+    gain_dn = mean_of_sites(request.noise->gain_dn_per_e);
     if (per_file > 1) {
       const PerSite<double> exposure_dn2 = noise_of_one_exposure(*request.noise, sites, request.pedestal_dn);
-      frames = 1 / (1 / per_file + (group.rounded ? rounding_dn2 / mean_of(exposure_dn2) : 0));
+      frames = 1 / (1 / per_file + (group.rounded ? rounding_dn2 / mean_of_sites(exposure_dn2) : 0));
       for (int site = 0; site < 4; ++site) sites[site].noise_dn2 = exposure_dn2[site];
     }
   } else {
@@ -144,7 +142,7 @@ Result<Job> weigh(Groups groups, const FrameSetting& picture, const DarkRequest&
   }
   const DarkScaling known{
       .doubling_c = request.doubling_c,
-      .pedestal_dn = request.pedestal_dn ? std::optional(mean_of(*request.pedestal_dn)) : std::nullopt,
+      .pedestal_dn = request.pedestal_dn ? std::optional(mean_of_sites(*request.pedestal_dn)) : std::nullopt,
       .pedestal_from_picture = request.masked_dn.has_value()};
   auto weights = weigh_darks(levels_of(job), {*picture.exposure_s, picture.temperature_c}, known);
   if (!weights) return tl::make_unexpected(weights.error());

@@ -70,8 +70,6 @@ double rounded_count(double count) {
   return std::clamp(step * std::round(count / step), 1.0, static_cast<double>(max_exposures));
 }
 
-double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
-
 }  // namespace
 
 PerSite<double> noise_of_one_exposure(const DarkNoiseModel& noise, const PerSite<DarkSite>& sites,
@@ -95,7 +93,7 @@ double estimate_exposures(const DarkGroup& group, const RawDn& picture, const Da
   const double pattern_dn2 = same ? std::max(0.0, sums.product / sums.n / 2) : 0;
   const double error_dn2 = std::sqrt(dark_dn2 * (2 * dark_dn2 + (same ? picture_dn2 : 0)) / sums.n);
   const double rest_dn2 = dark_dn2 - pattern_dn2 - (group.rounded ? rounding_dn2 : 0);
-  const double one_dn2 = mean_of(noise_of_one_exposure(noise, sites_of(group), pedestal_dn));
+  const double one_dn2 = mean_of_sites(noise_of_one_exposure(noise, sites_of(group), pedestal_dn));
   return rounded_count(one_dn2 / std::max({rest_dn2, error_dn2, one_dn2 / max_exposures}));
 }
 
@@ -108,7 +106,7 @@ double estimate_exposures_between(const DarkGroup& group, const RawDn& picture, 
     one_dn2[site] = std::min(one_dn2[site], darkest_noise_dn2(picture, site));
     between_dn2 += sites[site].noise_dn2 / 4;
   }
-  const double one = mean_of(one_dn2);
+  const double one = mean_of_sites(one_dn2);
   const auto degrees = static_cast<double>(group.mean_dn.size()) * (group.frames - 1);
   const double rounding = group.rounded ? rounding_dn2 : 0, error_dn2 = between_dn2 * std::sqrt(2 / degrees);
   const double rest_dn2 = std::max({between_dn2 - rounding, rounding, error_dn2, one / max_exposures});

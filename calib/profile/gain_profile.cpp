@@ -21,8 +21,6 @@ constexpr double dithered_deviation_dn = 0.5;  // smaller noise is not measurabl
 constexpr const char* dark_series_note = "dark series";
 constexpr const char* black_level_note = "black level";
 
-double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
-
 PerSite<double> values_of(const PerSite<Estimate>& estimates) {
   PerSite<double> out{};
   for (int site = 0; site < 4; ++site) out[site] = estimates[site].value;
@@ -166,7 +164,7 @@ GainProfile& gain_at(CameraProfile& profile, const FrameSetting& setting) {
 void put_photon_transfer(const PhotonTransfer& transfer, const FrameSetting& darks, const Measured& measured,
                          GainProfile& out) {
   const bool keeps_pedestal = pedestal_is_measured(out);
-  const double black = mean_of(keeps_pedestal ? values_of(*out.pedestal_dn) : transfer.black_dn);
+  const double black = mean_of_sites(keeps_pedestal ? values_of(*out.pedestal_dn) : transfer.black_dn);
   SensorModel& sensor = begin_sensor(darks, transfer.system_gain_dn_per_e, black, measured, out);
   if (transfer.read_noise_e) {
     sensor.read_noise_e = pixel_noise(transfer.read_noise_e->value, transfer.row_noise_e);
@@ -198,7 +196,7 @@ void put_photon_transfer(const PhotonTransfer& transfer, const FrameSetting& dar
 void put_dark_series(const DarkSeries& series, std::span<const DarkGroup> groups, const Estimate& gain,
                      const Measured& measured, GainProfile& out) {
   const FrameSetting& setting = groups.front().setting;
-  const double black = mean_of(values_of(series.pedestal_dn));
+  const double black = mean_of_sites(values_of(series.pedestal_dn));
   const bool had_read_noise = out.sensor && out.sensor->read_noise_e > 0;
   SensorModel& sensor = begin_sensor(setting, gain, black, measured, out);
   if (!had_read_noise && series.read_noise_e) {
@@ -225,7 +223,7 @@ void put_black(const BlackFigures& black, const FrameSetting& setting, const Mea
   out.pedestal_dn = black.level_dn;
   out.pedestal_holds = BlackPoint::Holds::pedestal_and_dark;
   put_ranges({&setting, 1}, out);
-  if (out.sensor) out.sensor->black_level_dn = mean_of(values_of(black.level_dn));
+  if (out.sensor) out.sensor->black_level_dn = mean_of_sites(values_of(black.level_dn));
   note(measured_figures(black_level_note, measured, 0, 0), out);
 }
 
@@ -233,7 +231,7 @@ void put_picture_noise(const PictureNoise& noise, const BlackPoint& black, const
                        const Measured& measured, GainProfile& out) {
   const bool keeps_pedestal = pedestal_is_measured(out);
   const Estimate& gain = noise.gain_dn_per_e;
-  const double level = mean_of(keeps_pedestal ? values_of(*out.pedestal_dn) : black.pedestal_dn);
+  const double level = mean_of_sites(keeps_pedestal ? values_of(*out.pedestal_dn) : black.pedestal_dn);
   SensorModel& sensor = begin_sensor(setting, gain, level, measured, out);
   const double step = noise.traces.code_step_dn;
   const double without_codes_dn2 = std::max(0.0, noise.offset_dn2.value - step * step / 12);

@@ -36,4 +36,9 @@ constexpr int site_of(int x, int y) { return ((y & 1) << 1) | (x & 1); }
 template <class T>
 using PerSite = std::array<T, 4>;
 
+template <class T>
+constexpr double mean_of_sites(const PerSite<T>& of_site) {
+  return static_cast<double>(of_site[0] + of_site[1] + of_site[2] + of_site[3]) / 4;
+}
+
 }  // namespace lowlux

@@ -125,10 +125,6 @@ double white_at(const RawDn& raw, int site) {
   return raw.white_dn[static_cast<int>(colour_at(raw.phase, site & 1, site >> 1))];
 }
 
-double mean_pedestal_dn(const BlackPoint& black) {
-  return (black.pedestal_dn[0] + black.pedestal_dn[1] + black.pedestal_dn[2] + black.pedestal_dn[3]) / 4;
-}
-
 double mean_range_dn(const RawDn& raw, const BlackPoint& black) {
   double range = 0;
   for (int site = 0; site < 4; ++site) range += (white_at(raw, site) - black.pedestal_dn[site]) / 4;

@@ -38,9 +38,6 @@ Result<BlackPoint> choose_black(const RawDn& raw, const BlackRequest& request);
 /// Returns the white level of the site's colour [DN]; for SensorLayout::linear_rgb sites 0 to 3 are R, G, B and B.
 double white_at(const RawDn& raw, int site);
 
-/// Returns the mean pedestal of the four sites [DN].
-double mean_pedestal_dn(const BlackPoint& black);
-
 /// Returns the white level above black [DN], as the mean of the four sites.
 double mean_range_dn(const RawDn& raw, const BlackPoint& black);
 

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <utility>
 
+#include "isp/base/cfa.h"
 #include "isp/raw/black_point.h"
 
 namespace lowlux::isp {
@@ -39,7 +40,7 @@ float scaled(double dn, double black_dn, double mean_black_dn, double white_dn) 
 // Subtracts the pattern of a tag that four figures cannot express.
 template <class Sample>
 void row_by_pattern(const RawDn& raw, const Sample* dn, const BlackPoint& black, const Rect& part, int y, float* out) {
-  const double mean_black_dn = mean_pedestal_dn(black);
+  const double mean_black_dn = mean_of_sites(black.pedestal_dn);
   for (int x = 0; x < part.width; ++x)
     out[x] = scaled(dn[x], black.pattern->at(part.x + x, part.y + y), mean_black_dn, white_at(raw, site_of(x, y)));
 }

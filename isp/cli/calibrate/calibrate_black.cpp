@@ -10,6 +10,7 @@
 #include "calib/dark/light_in_darks.h"
 #include "calib/profile/profile_use.h"
 #include "isp/base/camera_profile.h"
+#include "isp/base/cfa.h"
 #include "isp/cli/calibrate/black_report.h"
 #include "isp/cli/calibrate/calibration.h"
 #include "isp/cli/shared/exit_code.h"
@@ -24,15 +25,13 @@ constexpr double light_of_range = 0.005;  // maximum excess of the image over th
 constexpr double much_light = 0.1;        // of the range above the tagged black level
 constexpr double light_of_noise = 10;     // the maximum in standard deviations of the masked pixels
 
-double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
-
 /// Checks that a dark frame is as dark as its own masked pixels, if it has some.
 Result<void> check_dark(const RawFrame& frame) {
   const RawDn& raw = frame.raw;
   const isp::MaskedBlack masked = isp::masked_black_of(frame);
   if (!masked.black) return {};
-  const double black = mean_of(masked.black->pedestal_dn), mean = calib::mean_dn(raw);
-  const double tolerated = std::max(light_of_noise * mean_of(masked.black->noise_std_dn),
+  const double black = mean_of_sites(masked.black->pedestal_dn), mean = calib::mean_dn(raw);
+  const double tolerated = std::max(light_of_noise * mean_of_sites(masked.black->noise_std_dn),
                                     light_of_range * isp::mean_range_dn(raw, *masked.black));
   if (mean - black <= tolerated) return {};
   return fail(ErrorCode::invalid_argument,
@@ -118,7 +117,8 @@ void warn_of_light(const calib::DarkGroup& group, const Darks& darks, std::vecto
   if (is_tagged) {
     double level_dn = 0;
     for (const calib::DarkSite& site : sites) level_dn += site.spread.median / 4;
-    const double black_dn = mean_of(tagged->black_dn), fraction = (level_dn - black_dn) / (tagged->white_dn - black_dn);
+    const double black_dn = mean_of_sites(tagged->black_dn),
+                 fraction = (level_dn - black_dn) / (tagged->white_dn - black_dn);
     if (fraction > much_light) {
       warnings.push_back(fmt::format(
           "the frames{} are {:.0f} % of the range above the black level of their files: if this is not dark charge but "

@@ -72,7 +72,7 @@ BackgroundBlock measure_block(const std::vector<BackgroundTile>& tiles, const Pe
   const double centre = median_of_values(values);
   for (float& value : values) value = std::fabs(value - static_cast<float>(centre));
   const double mad_std = 1.4826 * median_of_values(values);
-  const double read_e2 = (variance_e2[0] + variance_e2[1] + variance_e2[2] + variance_e2[3]) / 4;
+  const double read_e2 = mean_of_sites(variance_e2);
   const double noise_e2 = std::max(std::max(centre, 0.0) + read_e2, min_variance_e2) / (tile_px * tile_px);
   const double limit = 3 * std::max(mad_std, std::sqrt(noise_e2));
   int used = 0;

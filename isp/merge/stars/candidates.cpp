@@ -7,6 +7,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "isp/base/cfa.h"
 #include "isp/merge/stars/detection_limit.h"
 #include "isp/merge/stars/star_rows.h"
 
@@ -26,14 +27,14 @@ class Limits {
     const PerSite<double> median = median_level(search.background);
     double lowest = 1e9, highest = 0;
     for (const PerSite<float>& level : search.background.level_e) {
-      lowest = std::min(lowest, mean_of(level));
-      highest = std::max(highest, mean_of(level));
+      lowest = std::min(lowest, mean_of_sites(level));
+      highest = std::max(highest, mean_of_sites(level));
     }
     lowest = std::clamp(lowest, 1e-4, 1e7);
     highest = std::clamp(highest, lowest, 1e7);
     log_first_ = std::log(lowest);
     log_step_ = std::max(std::log(highest / lowest) / (steps - 1), 1e-6);
-    const double centre = std::max((median[0] + median[1] + median[2] + median[3]) / 4, 1e-9);
+    const double centre = std::max(mean_of_sites(median), 1e-9);
     for (int i = 0; i < steps; ++i) {
       PerSite<double> level{};
       const double mean = std::exp(log_first_ + i * log_step_);
@@ -45,7 +46,7 @@ class Limits {
   double lowest() const { return *std::min_element(limit_.begin(), limit_.end()); }
 
   double at(const PerSite<double>& level) const {
-    const double mean = std::max((level[0] + level[1] + level[2] + level[3]) / 4, 1e-4);
+    const double mean = std::max(mean_of_sites(level), 1e-4);
     const double place = std::clamp((std::log(mean) - log_first_) / log_step_, 0.0, steps - 1.0);
     const int i = std::min(static_cast<int>(place), steps - 2);
     const auto k = static_cast<std::size_t>(i);
@@ -54,10 +55,6 @@ class Limits {
 
  private:
   static constexpr int steps = 17;
-  static double mean_of(const PerSite<float>& level) {
-    return static_cast<double>(level[0] + level[1] + level[2] + level[3]) / 4;
-  }
-
   double log_first_ = 0;
   double log_step_ = 1;
   std::array<double, steps> limit_{};

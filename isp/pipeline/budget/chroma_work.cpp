@@ -7,6 +7,7 @@
 
 #include "denoise/spatial/chroma_start.h"
 #include "denoise/spatial/layout.h"
+#include "isp/base/cfa.h"
 #include "isp/pipeline/render/cell_figures.h"
 
 namespace lowlux::isp {

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/base/cfa.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/model/colour/dark_desaturation.h"
 #include "isp/pipeline/render/cell_figures.h"

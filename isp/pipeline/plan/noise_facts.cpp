@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/base/cfa.h"
 #include "isp/pipeline/plan/local_noise.h"
 #include "isp/pipeline/render/cell_figures.h"
 

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/base/cfa.h"
 #include "isp/pipeline/plan/dark_charge.h"
 #include "isp/pipeline/plan/framing.h"
 #include "isp/raw/black_point.h"
@@ -45,7 +46,7 @@ struct RegionSums {
     const int c = bayer ? static_cast<int>(colour_at(raw.phase, x, y)) : sample;
     const double pedestal = black.pedestal_dn[static_cast<std::size_t>(site)], white = white_at(raw, site);
     const double level = black.pattern ? black.pattern->at(x, y, sample) : pedestal;
-    const double mean = black.pattern && bayer ? mean_pedestal_dn(black) : pedestal;
+    const double mean = black.pattern && bayer ? mean_of_sites(black.pedestal_dn) : pedestal;
     colour[static_cast<std::size_t>(c)].add((dn - level) / (white - mean));
     saturated += dn >= white;
   }

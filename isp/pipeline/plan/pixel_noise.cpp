@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "denoise/check/noise_check.h"
+#include "isp/base/cfa.h"
 #include "isp/base/noise_ratio.h"
 #include "isp/pipeline/budget/frame_sample.h"
 #include "isp/pipeline/render/pixel_cells.h"
@@ -24,7 +25,7 @@ constexpr int most_sample_px = 2048;
 /// Returns the black level of a colour [DN]; that of a monochrome frame is the mean over its sites.
 double black_dn_of(const RawFrame& frame, const RawLevels& levels, std::size_t colour) {
   const PerSite<double>& black = levels.black.pedestal_dn;
-  return planes_of(frame.raw) == 3 ? black[colour] : (black[0] + black[1] + black[2] + black[3]) / 4;
+  return planes_of(frame.raw) == 3 ? black[colour] : mean_of_sites(black);
 }
 
 /// Returns the gains that make a neutral equal in all sites.

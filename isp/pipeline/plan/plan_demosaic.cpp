@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "isp/base/cfa.h"
 #include "isp/pipeline/render/cell_figures.h"
 
 namespace lowlux::isp {

@@ -3,9 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "isp/base/cfa.h"
-
-/// These functions average over a Bayer cell, by colour or by site.
+/// States the colours of a Bayer cell, and means over them.
 namespace lowlux::isp {
 
 /// States the fractions of a cell's sites that are red, green and blue.
@@ -16,10 +14,6 @@ constexpr double mean_of_colours(const std::array<double, 3>& of_colour) {
   double sum = 0;
   for (std::size_t c = 0; c < 3; ++c) sum += fraction_of_sites[c] * of_colour[c];
   return sum;
-}
-
-constexpr double mean_of_sites(const PerSite<double>& of_site) {
-  return (of_site[0] + of_site[1] + of_site[2] + of_site[3]) / 4;
 }
 
 }  // namespace lowlux::isp

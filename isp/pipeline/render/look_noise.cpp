@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "isp/base/cfa.h"
 #include "isp/base/look_grid.h"
 #include "isp/pipeline/render/cell_figures.h"
 #include "isp/pipeline/render/pixel_cells.h"

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/base/cfa.h"
 #include "isp/model/sensor/masked_noise.h"
 
 namespace lowlux::isp {
@@ -210,20 +211,18 @@ bool profile_follows_scene(const RawDn& raw, const Rect& region, double noise_st
   return std::sqrt(profile.variance()) > 5 * expected && correlation(strip, scene) > 0.5;
 }
 
-double mean_of(const PerSite<double>& v) { return (v[0] + v[1] + v[2] + v[3]) / 4; }
-
 std::string why_not_dark(const RawDn& raw, const Rect& region, const BlackPoint& black) {
   if (!raw.black_tag)
     return "the file does not state that its border is masked, and there is no black level to verify it";
-  const double level = mean_of(black.pedestal_dn);
-  const double noise = mean_of(black.noise_std_dn);
+  const double level = mean_of_sites(black.pedestal_dn);
+  const double noise = mean_of_sites(black.noise_std_dn);
   const double tag = raw.black_tag->pattern_dn.front();
   if (!(noise > 0)) return "the border has one value only, so it was not read out";
   if (std::fabs(level - tag) > std::max(max_offset_of_noise * noise, max_offset_of_range * (raw.white_dn[1] - tag))) {
     return fmt::format("the border's level {:.1f} DN is too far from the tagged black {:.1f} DN to be masked", level,
                        tag);
   }
-  if (profile_follows_scene(raw, region, mean_of(black.noise_std_dn)))
+  if (profile_follows_scene(raw, region, mean_of_sites(black.noise_std_dn)))
     return "the border shows the scene, so it is not masked";
   return {};
 }
