@@ -124,8 +124,9 @@ TEST(FloatFrames, OfAnyLayoutAndSizeAreDevelopedLikeCodes) {
         options.demosaic = method;
         const Picture codes = developed(frame, options);
         const Picture floats = developed(floats_of(std::move(frame), 1.0 / 65536), options);
-        // Float rounding of values to 2; with `residual` it also moves the weights, and 5.0e-6 was measured.
-        const double tolerance = method == DemosaicMethod::malvar ? 4e-6 : 6e-6;
+        // Float rounding of values to 2. With `residual` it also moves the weights and, over the ridge of 0.0006, the
+        // slopes: 1.8e-5 was measured, a third of it with a ridge of 0.002.
+        const double tolerance = method == DemosaicMethod::malvar ? 4e-6 : 2e-5;
         EXPECT_LE(difference(floats, codes), tolerance) << width << " x " << height << ", " << name_of(method);
       }
     }

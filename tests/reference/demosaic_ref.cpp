@@ -83,7 +83,7 @@ std::vector<Rgb> by_residual(const LinearisedMosaic& mosaic, const LinearisedMos
   const auto colour = [&](int x, int y) { return colour_at(mosaic.phase, x & 1, y & 1); };
   const auto is_green = [&](int x, int y) { return colour(x, y) == CfaColour::green; };
   const double scale = std::cbrt(limited(how.white, 1e-3, 1));
-  const double ridge = 2e-3 * scale * scale;
+  const double ridge = 6e-4 * scale * scale;
   const double floor = 1e-4 * scale + 0.5 * 9 * std::sqrt(2 * 0.875) * limited(how.noise_std, 0, 1);
 
   const Field u = field([&](int x, int y) { return codes.at(x, y); });
@@ -125,9 +125,10 @@ std::vector<Rgb> by_residual(const LinearisedMosaic& mosaic, const LinearisedMos
   const double noise = limited(how.noise_std, 0, 1), detail_floor = 1e-5 * scale * scale + 64 * noise * noise;
   const auto shared_detail = [&](int x, int y) {
     const double o = sum_3x3(own_squared, x, y, 2) / 9, g = sum_3x3(green_squared, x, y, 2) / 9;
-    const double correlation = sum_3x3(both, x, y, 2) / 9 / (std::sqrt(o * g) + detail_floor);
-    const double by_detail = std::min(1 + 2 * correlation, (4 * g + detail_floor) / (o + detail_floor));
-    return std::clamp(std::max(by_detail, 2 * sum_3x3(fine, x, y, 2) / 9 / (o + detail_floor)), 0.0, 1.0);
+    const double b = sum_3x3(both, x, y, 2) / 9, size = std::sqrt(o * g);
+    const double alike = 1 + (2 * b - 1.25 * size) / (size + 4 * detail_floor);
+    const double by_detail = std::min(alike, (2.5 * g + detail_floor) / (o + detail_floor));
+    return std::clamp(std::max(by_detail, 4 * sum_3x3(fine, x, y, 2) / 9 / (o + detail_floor)), 0.0, 1.0);
   };
   // Green: four one-sided means, weighted by the gradients on their side (Pekkucuksen, Altunbasak 2010), as far as
   // green shares detail; for the rest the neighbouring greens with the same weights.

@@ -120,7 +120,7 @@ ResidualBand<Mosaic>::ResidualBand(const Mosaic& in, const Demosaic& how, float 
   };
   encoding_ = encoding_with(how.offset);
   const float scale = std::cbrt(limited(how.white, 1e-3f, 1));
-  ridge_ = 2e-3f * scale * scale;
+  ridge_ = 6e-4f * scale * scale;
   const float noise_std = limited(how.noise_std, 0, 1);
   floor_ = 1e-4f * scale + 4.5f * std::sqrt(1.75f) * noise_std;
   detail_floor_ = 1e-5f * scale * scale + 64 * noise_std * noise_std;  // 16 times what white noise adds to o

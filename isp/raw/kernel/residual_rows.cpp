@@ -126,11 +126,13 @@ void SharedDetailRow(const SharedDetailRows& in, int pairs) {
     const auto mean = [&](const float* sum)
                           HWY_ATTR { return hn::Mul(ninth, hn::Add(load(sum + i), sum_of(sum + i - 1, sum + i + 1))); };
     const VF own = mean(in.sum[0]), green = mean(in.sum[1]), both = mean(in.sum[2]), fine = mean(in.sum[3]);
-    const VF correlation = hn::Div(both, hn::Add(hn::Sqrt(hn::Mul(own, green)), floor));
+    const VF size = hn::Sqrt(hn::Mul(own, green));
+    const VF excess = hn::NegMulAdd(constant(1.25f), size, hn::Add(both, both));
+    const VF alike = hn::Add(one, hn::Div(excess, hn::MulAdd(constant(4), floor, size)));
     const VF over_own = hn::Div(one, hn::Add(own, floor));
-    const VF ratio = hn::Mul(hn::MulAdd(constant(4), green, floor), over_own);
-    const VF shared = hn::Min(hn::MulAdd(constant(2), correlation, one), ratio);
-    store(hn::Min(hn::Max(shared, hn::Mul(hn::Add(fine, fine), over_own)), one), in.shared + i);
+    const VF ratio = hn::Mul(hn::MulAdd(constant(2.5f), green, floor), over_own);
+    const VF shared = hn::Min(alike, ratio);
+    store(hn::Min(hn::Max(shared, hn::Mul(hn::Mul(constant(4), fine), over_own)), one), in.shared + i);
   });
 }
 
