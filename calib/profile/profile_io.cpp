@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "calib/profile/json_keys.h"
 #include "calib/profile/profile_schema.h"
 
 namespace lowlux::calib {
@@ -20,7 +21,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Names = std::initializer_list<const char*>;
 
-constexpr int deepest = 8;            // a profile has six levels
+constexpr std::size_t deepest = 8;    // a profile has six levels
 constexpr std::size_t max_keys = 64;  // of one object; the JSON library compares each with all previous ones
 
 /// Reads one JSON object; finish() reports unexpected keys.
@@ -192,69 +193,44 @@ class Reader {
   std::set<std::string> asked_;
 };
 
-/// Rejects duplicate keys: JSON allows them and does not define which is valid. After a failure nothing more is kept.
-class KeyCheck {
- public:
-  explicit KeyCheck(ProfileFailure& failure) : failure_(failure) {}
-
-  /// Returns whether the value is to be kept.
-  bool operator()(int depth, Json::parse_event_t event, const Json& value) {
-    if (failure_.error) return false;
-    if (depth > deepest) {
-      failure_.set(ErrorCode::malformed, "", "nested deeper than a profile is");
-      return false;
+Error error_of(const JsonFault& fault, std::string_view text) {
+  ProfileFailure failure;
+  switch (fault.kind) {
+    case JsonFault::Kind::not_json: {
+      const auto line = 1 + std::ranges::count(text.substr(0, fault.byte), '\n');
+      return {ErrorCode::malformed,
+              fmt::format("the profile is not JSON, or damaged: its line {} cannot be read, near byte {} of {}; "
+                          "restore the file, or calibrate again",
+                          line, fault.byte, text.size()),
+              ""};
     }
-    if (event == Json::parse_event_t::object_start) levels_.emplace_back();
-    if (event == Json::parse_event_t::object_end) levels_.pop_back();
-    if (event == Json::parse_event_t::key) add(value.get<std::string>());
-    return !failure_.error;
-  }
-
- private:
-  struct Level {
-    std::set<std::string> keys;
-    std::string last;
-  };
-
-  void add(const std::string& key) {
-    levels_.back().last = key;
-    if (levels_.back().keys.size() == max_keys) {
-      return failure_.set(ErrorCode::malformed, "", fmt::format("an object has more than {} keys", max_keys));
+    case JsonFault::Kind::number_too_large:
+      return {ErrorCode::malformed, "the profile is not JSON: restore the file, or calibrate again", ""};
+    case JsonFault::Kind::too_deep:
+      failure.set(ErrorCode::malformed, "", "nested deeper than a profile is");
+      break;
+    case JsonFault::Kind::too_many_keys:
+      failure.set(ErrorCode::malformed, "", fmt::format("an object has more than {} keys", max_keys));
+      break;
+    case JsonFault::Kind::duplicate_key: {
+      std::string path;
+      for (const std::string& key : fault.keys) path = joined(path, key);
+      failure.set(ErrorCode::malformed, path, "this key is given twice");
+      break;
     }
-    if (levels_.back().keys.insert(key).second) return;
-    std::string path;
-    for (const Level& level : levels_) path = joined(path, level.last);
-    failure_.set(ErrorCode::malformed, path, "this key is given twice");
   }
-
-  ProfileFailure& failure_;
-  std::vector<Level> levels_;
-};
+  return *failure.error;
+}
 
 Result<Json> parsed(std::string_view text) {
   if (text.size() > largest_profile_bytes) {
     return fail(ErrorCode::too_large,
                 fmt::format("the profile has {} bytes, at most {} are read", text.size(), largest_profile_bytes));
   }
-  try {
-    ProfileFailure failure;
-    Json document =
-        Json::parse(text, [check = KeyCheck(failure)](int depth, Json::parse_event_t event, Json& value) mutable {
-          return check(depth, event, value);
-        });
-    if (failure.error) return tl::make_unexpected(*failure.error);
-    return document;
-  } catch (const Json::parse_error& e) {
-    const std::string_view before = text.substr(0, std::min(e.byte, text.size()));
-    const auto line = 1 + std::ranges::count(before, '\n');
-    return fail(
-        ErrorCode::malformed,
-        fmt::format("the profile is not JSON, or damaged: its line {} cannot be read, near byte {} of {}; restore "
-                    "the file, or calibrate again",
-                    line, e.byte, text.size()));
-  } catch (const Json::exception&) {
-    return fail(ErrorCode::malformed, "the profile is not JSON: restore the file, or calibrate again");
+  if (const auto fault = find_json_fault(text, {.max_depth = deepest, .max_keys = max_keys})) {
+    return tl::make_unexpected(error_of(*fault, text));
   }
+  return Json::parse(text);
 }
 
 }  // namespace

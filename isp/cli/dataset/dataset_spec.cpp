@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "calib/profile/json_keys.h"
 #include "capture/file/file_bytes.h"
 #include "isp/base/json_depth.h"
 #include "isp/base/text.h"
@@ -142,25 +143,16 @@ Result<Json> parse(const std::string& text) {
   if (nests_deeper(text, max_json_depth)) {
     return fail(ErrorCode::malformed, fmt::format("is nested in more than {} levels of brackets", max_json_depth));
   }
-  std::vector<std::set<std::string>> keys;
-  std::string twice;
-  const auto note = [&](int /*depth*/, Json::parse_event_t event, Json& value) {
-    if (event == Json::parse_event_t::object_start) keys.emplace_back();
-    if (event == Json::parse_event_t::object_end) keys.pop_back();
-    if (event == Json::parse_event_t::key && !keys.back().insert(value.get<std::string>()).second) {
-      twice = value.get<std::string>();
+  if (const auto fault = calib::find_json_fault(text, {})) {
+    if (fault->kind == calib::JsonFault::Kind::duplicate_key) {
+      return wrong(fault->keys.back(), "the key is given twice");
     }
-    return true;
-  };
-  try {
-    Json json = Json::parse(text, note);
-    if (!twice.empty()) return wrong(twice, "the key is given twice");
-    if (!json.is_object()) return fail(ErrorCode::malformed, "is not a JSON object");
-    return json;
-  } catch (const Json::exception& failure) {
-    const std::string what = failure.what();
+    const std::string& what = fault->reason;
     return fail(ErrorCode::malformed, "is not JSON: " + what.substr(std::min(what.find("] ") + 2, what.size())));
   }
+  Json json = Json::parse(text);
+  if (!json.is_object()) return fail(ErrorCode::malformed, "is not a JSON object");
+  return json;
 }
 
 Result<std::uint64_t> whole_of(const Json& json, const char* key, std::uint64_t fallback, std::uint64_t most) {

@@ -300,6 +300,7 @@ TEST_F(Dataset, BadSpecsAreOneLineWithFileAndKey) {
       {text(R"("exposure_s":1e999)"), "not JSON"},
       {text(R"("exposur_s":1)"), "exposur_s: unknown key; similar keys: exposure_s"},
       {text(R"("count":2)"), "count: the key is given twice"},
+      {text(R"("gain":{"uniform":[1,2],"uniform":[1,2]})"), "uniform: the key is given twice"},
       {text(R"("exposure_s":{"uniform":[2,1]})"), "exposure_s: the range [2,1] is reversed"},
       {text(R"("exposure_s":{"uniform":[1,1]})"), "exposure_s: the range [1,1] is empty"},
       {text(R"("exposure_s":{"uniform":[]})"), "exposure_s: uniform is not [LOW, HIGH]"},
