@@ -9,11 +9,20 @@
 #include "isp/base/text.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/model/colour/colorimetry.h"
+#include "isp/model/spectrum/spectral_lift.h"
 
 namespace lowlux::capture {
 namespace {
 
 using Numbers = std::optional<std::vector<double>>;
+
+// Every positive rational of TIFF lies in this range; the bytes of rationals that are read as doubles do not.
+constexpr double min_positive = 1e-10, max_positive = 1e10;
+constexpr double max_ratio = 1000;  // of three numbers; sodium lamps lead to neutrals of up to 300
+
+/// Largest excitation purity of a white under the colour matrices. These are least exact for narrow bands: with the
+/// published sensitivities of 22 cameras, low-pressure sodium lamps lead to purities of up to 1.08.
+constexpr double max_purity = 1.1;
 
 /// Returns the directory with a tag: profile and as-shot tags belong in the first one; some writers put them in that of
 /// the raw image.
@@ -53,7 +62,7 @@ Result<std::optional<Matrix3>> read_forward(const DngFile& dng, const TiffDirect
   return bad(name, "maps a neutral to an impossible colour");
 }
 
-/// Reads three positive numbers; nullopt if there is no such tag.
+/// Reads three positive numbers of similar size; nullopt if there is no such tag.
 Result<std::optional<Vector3>> read_positive(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
   auto values = numbers_of(dng, raw_image, name, 3);
   if (!values) return pass_on(values);
@@ -63,7 +72,13 @@ Result<std::optional<Vector3>> read_positive(const DngFile& dng, const TiffDirec
     out[i] = (**values)[i];
     if (!std::isfinite(out[i]) || out[i] <= 0)
       return bad(name, "holds " + number_text(out[i]) + ", expected numbers above 0");
+    if (out[i] < min_positive || out[i] > max_positive)
+      return bad(name, "holds " + number_text(out[i]) + ", expected numbers near 1");
   }
+  const auto [least, most] = std::minmax_element(out.begin(), out.end());
+  if (*most > max_ratio * *least)
+    return bad(name, "holds " + number_text(*least) + " and " + number_text(*most) + ", which differ by a factor of " +
+                         number_text(*most / *least) + ", more than " + number_text(max_ratio));
   return out;
 }
 
@@ -101,9 +116,9 @@ void read_white(const DngFile& dng, const TiffDirectory& raw_image, CameraColour
   colour.as_shot_white_xy = or_ignored(read_white_xy(dng, raw_image), warnings);
 }
 
-/// Returns whether images can be made of light of this white with the calibrations.
+/// Returns whether a light can have this white, and images can be made of it with the calibrations.
 bool is_usable(const CameraColour& colour, const isp::Xy& white) {
-  return isp::camera_to_xyz(colour, white, isp::white_d65).has_value();
+  return isp::excitation_purity(white) <= max_purity && isp::camera_to_xyz(colour, white, isp::white_d65).has_value();
 }
 
 bool is_usable(const CameraColour& colour, const Vector3& neutral) {

@@ -144,6 +144,8 @@ TEST(DngColour, WhitesThatCannotBeAreIgnoredByName) {
   const std::pair<std::uint16_t, Tag> cases[] = {{50728, Tag::numbers(TagType::rational, {0.5, 0, 0.6})},
                                                  {50728, Tag::rationals(TagType::rational, {{1, 2}, {1, 0}, {1, 2}})},
                                                  {50728, Tag::numbers(TagType::srational, {0.5, -1, 0.6})},
+                                                 {50728, Tag::numbers(TagType::rational, {1, 1000000, 1})},
+                                                 {50728, Tag::numbers(TagType::f64, {5e-306, 1e-305, 6e-306})},
                                                  {50727, Tag::numbers(TagType::rational, {1, 1, 0})},
                                                  {50729, Tag::numbers(TagType::rational, {0.7, 0.7})},
                                                  {50729, Tag::rationals(TagType::rational, {{0, 0}, {1, 3}})}};
@@ -166,6 +168,27 @@ TEST(DngColour, ANeutralThatNoLightHasGivesWayToTheWhiteThatTheFileStates) {
   dng.remove(50728).set(50729, Tag::numbers(TagType::rational, {0.01, 0.001}));
   EXPECT_EQ(warned(dng).find("the as-shot white x 0.01 y 0.001 is not"), 0u);
   EXPECT_FALSE(read_built(dng).colour.as_shot_white_xy);
+}
+
+TEST(DngColour, WhitesBeyondTheSpectralLocusAreIgnoredWithAForwardMatrixToo) {
+  DngBuilder dng;
+  dng.set(50964, Tag::numbers(TagType::srational, {0.6, 0.2, 0.1643, 0.3, 0.6, 0.1, 0.05, 0.1, 0.6751}));
+  // The last ones are yellow like sodium light, a red lamp, and equal channels (2000 K with a magenta tint).
+  const std::pair<std::vector<double>, bool> cases[] = {{{1, 10, 1}, true},   {{1, 0.1, 1}, true},  {{1, 900, 1}, true},
+                                                        {{1, 1, 0.1}, false}, {{5, 1, 0.2}, false}, {{1, 1, 1}, false}};
+  for (const auto& [neutral, is_ignored] : cases) {
+    dng.set(50728, Tag::numbers(TagType::rational, neutral));
+    const RawFrame frame = read_built(dng);
+    ASSERT_EQ(frame.warnings.size(), is_ignored ? 1u : 0u) << neutral[0] << " " << neutral[1];
+    if (is_ignored) {
+      EXPECT_NE(frame.warnings[0].find("is not the colour of a light"), std::string::npos);
+    }
+    EXPECT_NE(frame.colour.as_shot_neutral.has_value(), is_ignored);
+  }
+  dng.remove(50728).set(50729, Tag::numbers(TagType::rational, {0.4, 0.55}));
+  EXPECT_TRUE(read_built(dng).warnings.empty());
+  dng.set(50729, Tag::numbers(TagType::rational, {0.45, 0.08}));
+  EXPECT_EQ(warned(dng).find("the as-shot white x 0.45 y 0.08 is not"), 0u);
 }
 
 TEST(DngColour, NoiseProfilesAreOneForAllOrOnePerColour) {

@@ -95,6 +95,8 @@ Xy liftable(const Xy& xy) {
   return {white_e.x + farthest * (xy.x - white_e.x), white_e.y + farthest * (xy.y - white_e.y)};
 }
 
+double excitation_purity(const Xy& xy) { return 1 / reach(xy); }
+
 std::optional<Spectrum> lift(const Xyz& colour_cd_m2) {
   const std::optional<Xy> xy = xy_of(colour_cd_m2);
   if (!xy || !(liftable(*xy) == *xy)) return std::nullopt;

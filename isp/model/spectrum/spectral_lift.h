@@ -30,6 +30,10 @@ std::optional<Spectrum> lift(const Xyz& colour_cd_m2);
 /// can.
 Xy liftable(const Xy& xy);
 
+/// Returns the excitation purity (CIE S 017) relative to the equal-energy white: 0 there, 1 on the spectral
+/// locus and the line of purples, more where no light is.
+double excitation_purity(const Xy& xy);
+
 /// Tabulates a sensor's response to lifted colours, as a bilinear table over xy with steps of 1/128: electrons per
 /// second in a pixel of R, G, B per cd/m2 of X + Y + Z. It is exactly linear in xy for a sensor whose sensitivities are
 /// sums of colour-matching functions, and nearly so for real ones.

@@ -72,6 +72,19 @@ TEST(SpectralLift, RefusesColoursNoLightCanHave) {
   EXPECT_FALSE(lift(*xyz_of(Xy{0.05, 0.05})));
 }
 
+TEST(SpectralLift, ExcitationPurityIsOneOnTheLocusAndTheLineOfPurples) {
+  EXPECT_EQ(excitation_purity(white_e), 0);
+  for (int i = 0; i < lift_nodes; ++i) {
+    const double nm = lift_wavelength_nm(i);
+    const auto& observer = cie_1931_observer();
+    const Xyz line{observer[0].at(nm), observer[1].at(nm), observer[2].at(nm)};
+    EXPECT_NEAR(excitation_purity(*xy_of(line)), 1, 1e-6) << nm << ": red ends differ by the table's digits";
+  }
+  EXPECT_NEAR(excitation_purity({(0.1741 + 0.7347) / 2, (0.0050 + 0.2653) / 2}), 1, 1e-3);  // 380 and 780 nm
+  EXPECT_NEAR(excitation_purity({1 / 3.0 + 0.1, 1 / 3.0}), 2 * excitation_purity({1 / 3.0 + 0.05, 1 / 3.0}), 1e-12);
+  EXPECT_GT(excitation_purity({0.05, 0.05}), 1);
+}
+
 TEST(SpectralLift, MovesUnliftableColoursToTheLocusAndNoOthers) {
   const Xy inside{0.3, 0.3}, outside{0.9, 0.4};
   EXPECT_EQ(liftable(inside), inside);
