@@ -165,13 +165,14 @@ class Collector {
   explicit Collector(std::vector<std::string>& warnings) : warnings_(warnings) {}
 
   /// Adds a tag, unless it was added before.
-  void add(const TiffEntry& entry, std::vector<SourceTag>& to) {
+  /// @param kind  what a warning calls it, followed by its number
+  void add(const TiffEntry& entry, std::vector<SourceTag>& to, std::string_view kind = "tag ") {
     const std::size_t unit = unit_bytes(entry.type);
     if (unit == 0 || entry.count == 0) return;
     if (std::any_of(to.begin(), to.end(), [&](const SourceTag& tag) { return tag.id == entry.id; })) return;
     if (!entry.inside_file || entry.values.size() > max_bytes - bytes_ || tags_ == max_tags) {
       if (!std::exchange(warned_, true)) {
-        warnings_.push_back("tag " + std::to_string(entry.id) +
+        warnings_.push_back(std::string(kind) + std::to_string(entry.id) +
                             (entry.inside_file ? " is not copied: the tags are too many or too large"
                                                : " is not copied: its values lie beyond the end of the file"));
       }
@@ -188,10 +189,10 @@ class Collector {
     to.push_back(std::move(tag));
   }
 
-  void add_all(const TiffDirectory& directory, std::vector<SourceTag>& to) {
+  void add_all(const TiffDirectory& directory, std::vector<SourceTag>& to, std::string_view kind) {
     for (const TiffEntry& entry : directory.entries) {
       const bool is_own = std::find(own_exif_tags.begin(), own_exif_tags.end(), entry.id) != own_exif_tags.end();
-      if (!is_own) add(entry, to);
+      if (!is_own) add(entry, to, kind);
     }
   }
 
@@ -204,18 +205,27 @@ class Collector {
     }
   }
 
+  void warn(std::string text) { warnings_.push_back(std::move(text)); }
+
  private:
   std::vector<std::string>& warnings_;
   std::size_t bytes_ = 0, tags_ = 0;
   bool warned_ = false;
 };
 
-/// Adds the directory that a tag of the first one points to; a damaged one is left out.
-void add_directory(const TiffFile& tiff, const TiffDirectory& main, TagName pointer, Collector& collector,
-                   std::vector<SourceTag>& to) {
-  const auto offset = main.whole(pointer);
-  if (!offset || !*offset) return;
-  if (const auto directory = tiff.directory(**offset)) collector.add_all(*directory, to);
+constexpr std::string_view exif_kind = "EXIF tag ", gps_kind = "GPS tag ";
+
+/// Adds the EXIF or GPS directory that a tag of the first directory points to, with a warning if it is damaged.
+/// @param kind  of its tags in warnings
+void add_directory(const TiffFile& tiff, const TiffDirectory& main, TagName pointer, std::string_view kind,
+                   Collector& collector, std::vector<SourceTag>& to) {
+  const auto found = main.whole(pointer).and_then([&](auto offset) -> Result<void> {
+    if (offset.value_or(0) == 0) return {};  // no directory begins at the header
+    return tiff.directory(*offset).map([&](const TiffDirectory& directory) { collector.add_all(directory, to, kind); });
+  });
+  if (found) return;
+  collector.warn("the tags of " + std::string(pointer.name) + " (tag " + std::to_string(pointer.id) +
+                 ") are not copied: " + found.error().message);
 }
 
 /// Returns the opcodes of OpcodeList3 other than gains and defects, which are in RawFrame::corrections; empty if there
@@ -290,8 +300,8 @@ SourceTags tags_of_dng(const TiffFile& tiff, const DngFile& dng, Collector& coll
   if (maker != nullptr && !is_of_lowlux(maker->values)) collector.add(*maker, tags.main);
   add_opcodes(dng, raw_image, tags.main);
   follow_calibrations(dng, tags.main);
-  if (dng.exif) collector.add_all(*dng.exif, tags.exif);
-  add_directory(tiff, dng.main, gps_ifd, collector, tags.gps);
+  if (dng.exif) collector.add_all(*dng.exif, tags.exif, exif_kind);
+  add_directory(tiff, dng.main, gps_ifd, gps_kind, collector, tags.gps);
   remove_unsafe_note(&dng.main, tags);
   const auto baseline = dng.main.numbers(tag::baseline_exposure, 1, 1);
   if (baseline && *baseline && std::fabs((**baseline)[0]) <= max_baseline_ev) {
@@ -305,12 +315,12 @@ SourceTags tags_of_blocks(const std::vector<ExifBlock>& blocks, Collector& colle
   for (const ExifBlock& block : blocks) {
     const auto first = block.tiff.directory(block.tiff.first_directory());
     if (!first) continue;
-    if (block.first == ExifBlock::First::exif) collector.add_all(*first, tags.exif);
-    if (block.first == ExifBlock::First::gps) collector.add_all(*first, tags.gps);
+    if (block.first == ExifBlock::First::exif) collector.add_all(*first, tags.exif, exif_kind);
+    if (block.first == ExifBlock::First::gps) collector.add_all(*first, tags.gps, gps_kind);
     if (block.first != ExifBlock::First::main) continue;
     collector.add_some(author_tags, *first, nullptr, tags.main);
-    add_directory(block.tiff, *first, tag::exif_ifd, collector, tags.exif);
-    add_directory(block.tiff, *first, gps_ifd, collector, tags.gps);
+    add_directory(block.tiff, *first, tag::exif_ifd, exif_kind, collector, tags.exif);
+    add_directory(block.tiff, *first, gps_ifd, gps_kind, collector, tags.gps);
   }
   remove_unsafe_note(nullptr, tags);
   return tags;

@@ -1,5 +1,5 @@
 // Tags that a picture can do without, damaged in every way there is: the picture is read, with one warning that names
-// the tag. Those that only inform (EXIF, GPS) stay absent without one.
+// the tag. Those that only inform (EXIF) stay absent without one.
 #include <functional>
 
 #include "tests/capture/read_built.h"
@@ -41,7 +41,6 @@ const std::vector<OptionalTag>& optional_tags() {
       {.id = 33434, .name = "ExposureTime", .sound = {0.01}, .warns = false},
       {.id = 33437, .name = "FNumber", .sound = {4}, .warns = false},
       {.id = 34855, .name = "PhotographicSensitivity", .sound = {800}, .warns = false},
-      {.id = 34853, .name = "GPSInfo", .sound = {400000}, .type = TagType::u32, .warns = false},
       {.id = 37386, .name = "FocalLength", .sound = {50}, .warns = false},
       {.id = 50730, .name = "BaselineExposure", .sound = {0.5}, .warns = false},
   };

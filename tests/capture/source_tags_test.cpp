@@ -126,5 +126,64 @@ TEST(SourceTags, KeepTheMakerNoteOnlyIfTheFileStatesThatItIsSafe) {
   }
 }
 
+/// Returns a DNG with a GPS directory of a latitude.
+std::vector<std::byte> dng_with_gps() {
+  DngBuilder dng;
+  dng.set(34853, Tag::numbers(TagType::u32, {0}));
+  const std::size_t end = dng.build().size() / 2 * 2 + 2;
+  std::vector<std::byte> file = dng.set(34853, Tag::numbers(TagType::u32, {static_cast<double>(end)})).build();
+  file.resize(end);
+  test::TagDirectory place;
+  place[1] = Tag::text("N");
+  place[2] = Tag::rationals(TagType::rational, {{48, 1}, {51, 1}, {30, 1}});
+  const auto directory = test::encode_directory(place, end, false);
+  file.insert(file.end(), directory.begin(), directory.end());
+  return file;
+}
+
+/// Returns the place of the entry of a tag in the first directory, or in that of GPS.
+std::size_t gps_entry_of(const std::vector<std::byte>& file, std::uint16_t id) {
+  const auto tiff = TiffFile::open(file);
+  const auto main = tiff->directory(tiff->first_directory());
+  const auto gps = tiff->directory(**main->whole({34853, "GPSInfo"}));
+  return (id == 34853 ? *main : *gps).find({id, ""})->place;
+}
+
+void overwrite(std::vector<std::byte>& file, std::size_t at, std::uint32_t value, std::size_t bytes) {
+  for (std::size_t i = 0; i < bytes; ++i) file[at + i] = static_cast<std::byte>(value >> (8 * i) & 255);
+}
+
+TEST(SourceTags, ADamagedGpsDirectoryIsWarnedOfByName) {
+  std::vector<std::string> warnings;
+  EXPECT_EQ(tags_of(dng_with_gps(), warnings)->gps.size(), 2u);
+  EXPECT_TRUE(warnings.empty());
+  struct Damage {
+    std::size_t place, bytes;
+    std::uint32_t value;
+  };
+  for (const Damage& damage : {Damage{8, 4, 0xFFFFFFF0}, {4, 4, 0x7FFFFFFF}, {4, 4, 0}, {2, 2, 2}}) {
+    std::vector<std::byte> file = dng_with_gps();
+    overwrite(file, gps_entry_of(file, 34853) + damage.place, damage.value, damage.bytes);
+    warnings.clear();
+    EXPECT_TRUE(tags_of(file, warnings)->gps.empty());
+    ASSERT_EQ(warnings.size(), 1u) << damage.value;
+    EXPECT_EQ(warnings[0].find("the tags of GPSInfo (tag 34853) are not copied: the tag "), 0u) << warnings[0];
+  }
+  std::vector<std::byte> file = dng_with_gps();
+  overwrite(file, gps_entry_of(file, 34853) + 8, 0, 4);  // no directory
+  warnings.clear();
+  EXPECT_TRUE(tags_of(file, warnings)->gps.empty());
+  EXPECT_TRUE(warnings.empty());
+}
+
+TEST(SourceTags, ADamagedGpsTagIsCalledOne) {
+  std::vector<std::byte> file = dng_with_gps();
+  overwrite(file, gps_entry_of(file, 2) + 8, 0x7FFFFFFF, 4);
+  std::vector<std::string> warnings;
+  EXPECT_EQ(tags_of(file, warnings)->gps.size(), 1u);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0], "GPS tag 2 is not copied: its values lie beyond the end of the file");
+}
+
 }  // namespace
 }  // namespace lowlux::capture
