@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace lowlux::calib {
@@ -224,6 +225,8 @@ namespace {
 constexpr int windows = 16;
 constexpr double dense_per_code = 30;
 constexpr int least_width = 8;              // codes of a window: in fewer, steps cannot be measured
+constexpr std::int64_t filled_count = 16;   // pixels: a code between two of this many is unused by chance in exp(-16)
+constexpr std::size_t min_gaps = 4;         // of a window
 constexpr double quietest_fraction = 0.05;  // of each group of samples
 constexpr int grid = 8;
 constexpr double min_excess = 0.1;
@@ -252,19 +255,43 @@ std::array<int, 2> range_in_use(const std::vector<std::int64_t>& count) {
   return {low, high};
 }
 
+/// Returns the distances from codes of first..last - 1 to the next one in use, where both have so many pixels that a
+/// code between them would be in use too. Codes of few pixels, between the levels of flat areas, show no distance.
+std::vector<int> gaps_of(const std::vector<std::int64_t>& count, int first, int last) {
+  std::vector<int> out;
+  for (int code = first; code < last; ++code) {
+    if (count[code] < filled_count) continue;
+    const auto next = std::find_if(count.begin() + code + 1, count.end(), [](std::int64_t n) { return n > 0; });
+    if (next != count.end() && *next >= filled_count) out.push_back(static_cast<int>(next - count.begin()) - code);
+  }
+  return out;
+}
+
+/// Returns the mean distance without those that separate levels, which are longer than twice the median.
+double mean_gap(std::vector<int> gaps) {
+  const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
+  std::nth_element(gaps.begin(), middle, gaps.end());
+  const int longest = 2 * *middle;
+  double sum = 0, n = 0;
+  for (const int gap : gaps) {
+    if (gap > longest) continue;
+    sum += gap;
+    n += 1;
+  }
+  return sum / n;
+}
+
 Steps steps_of(const std::vector<std::int64_t>& count) {
   const auto [low, high] = range_in_use(count);
   Steps out;
   for (int w = 0; w < windows; ++w) {
     const int first = low + (high - low) * w / windows, last = low + (high - low) * (w + 1) / windows;
     std::int64_t pixels = 0;
-    int used = 0;
-    for (int code = first; code < last; ++code) {
-      pixels += count[code];
-      used += count[code] > 0 ? 1 : 0;
-    }
+    for (int code = first; code < last; ++code) pixels += count[code];
     if (last - first < least_width || static_cast<double>(pixels) < dense_per_code * (last - first)) continue;
-    const int step = static_cast<int>(std::lround(static_cast<double>(last - first) / used));
+    std::vector<int> gaps = gaps_of(count, first, last);
+    if (gaps.size() < min_gaps) continue;
+    const int step = static_cast<int>(std::lround(mean_gap(std::move(gaps))));
     out.smallest = out.smallest == 0 ? step : std::min(out.smallest, step);
     out.largest = std::max(out.largest, step);
   }

@@ -73,7 +73,8 @@ struct RawTraces {
 inline constexpr double min_fine_to_coarse = 0.7;
 
 /// Measures steps and grid of the active area; fine_to_coarse is left at 0. Steps are measured where codes are dense
-/// (30 pixels for each code): in at least a sixteenth of the range in use.
+/// (30 pixels for each code), in sixteenths of the range in use: an unused code counts if the used ones next to it have
+/// so many pixels that it would be in use too.
 RawTraces code_traces(const RawDn& raw, Executor& executor);
 
 /// Sets fine_to_coarse, and `denoised` from it.

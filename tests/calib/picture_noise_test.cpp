@@ -171,6 +171,34 @@ TEST(CodeTraces, TellStepsThatGrow) {
   EXPECT_EQ(traces.largest_step_dn, 4);
 }
 
+/// Flat areas of 16 levels further apart the brighter they are, as of a chart, with noise of variance `mean` DN^2:
+/// codes between the levels are not in use.
+RawDn separate_levels(int side) {
+  std::mt19937 engine(5);
+  std::normal_distribution<double> normal;
+  return test::bayer_frame(side, side, BayerPhase::rggb, [&](int x, int y) {
+    const int level = (x / 70 + y / 70) % 16;
+    const double mean = 20.0 + 30 * level * level;
+    return 100 + static_cast<int>(std::lround(mean + std::sqrt(mean) * normal(engine)));
+  });
+}
+
+TEST(CodeTraces, UnusedCodesBetweenLevelsAreNoSteps) {
+  RawDn raw = separate_levels(1024);
+  const RawTraces fine = traces_of(raw);
+  EXPECT_FALSE(fine.companded);
+  EXPECT_EQ(fine.code_step_dn, 1);
+  EXPECT_EQ(fine.largest_step_dn, 1);
+  for (std::size_t i = 0; i < raw.dn.size(); ++i) {
+    std::uint16_t& code = raw.dn.data()[i];
+    if (code >= 2000) code &= 0xfff8;
+  }
+  const RawTraces coarse = traces_of(raw);
+  EXPECT_TRUE(coarse.companded);
+  EXPECT_EQ(coarse.code_step_dn, 1);
+  EXPECT_EQ(coarse.largest_step_dn, 8);
+}
+
 /// Returns grid_excess by its definition, pixel by pixel.
 double plain_grid_excess(const RawDn& raw) {
   double out = 0;
