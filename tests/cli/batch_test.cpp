@@ -137,7 +137,7 @@ TEST_F(Batch, AFolderStandsForTheRawFilesInIt) {
 
 TEST_F(Batch, EveryEntryOfAFolderWithTheExtensionOfARawFileIsAnInput) {
   raw("a.dng");
-  copies("a.dng", {"raws/a.dng", "raws/b.mef", "raws/c.txt"});
+  copies("a.dng", {"raws/a.dng", "raws/b.mef", "raws/c.txt", "raws/g.QTK", "raws/h.ia", "raws/i.rdc"});
   scratch_.write("raws/c.x3f", "no raw file");
   scratch_.write("raws/d.GPR", "no raw file");
   fs::create_symlink("nowhere.nef", file("raws/e.nef"));
@@ -148,9 +148,9 @@ TEST_F(Batch, EveryEntryOfAFolderWithTheExtensionOfARawFileIsAnInput) {
     EXPECT_NE(result.err.find(file("raws/") + name), std::string::npos) << name << result.err;
   }
   const Json report = Json::parse(result.out);
-  ASSERT_EQ(report.size(), 6U) << result.out;
+  ASSERT_EQ(report.size(), 9U) << result.out;
   EXPECT_EQ(report[1]["file"], file("raws/b.mef"));
-  EXPECT_EQ(names_in("out"), (std::vector<std::string>{"a.png", "b.png"}));
+  EXPECT_EQ(names_in("out"), (std::vector<std::string>{"a.png", "b.png", "g.png", "h.png", "i.png"}));
 }
 
 TEST_F(Batch, RawFilesInSubFoldersAreReportedInOneLine) {

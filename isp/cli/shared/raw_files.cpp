@@ -22,10 +22,10 @@ namespace fs = std::filesystem;
 // These are the extensions of cameras, those of formats that cannot be decoded included: such files are then reported.
 // A folder may also hold reference images, profiles and notes.
 constexpr std::array raw_extensions = std::to_array<std::string_view>(
-    {".3fr", ".ari", ".arw", ".bay", ".cap", ".cr2", ".cr3", ".crw", ".cs1", ".dc2", ".dcr",
-     ".dcs", ".dng", ".drf", ".eip", ".erf", ".fff", ".gpr", ".iiq", ".k25", ".kc2", ".kdc",
-     ".mdc", ".mef", ".mfw", ".mos", ".mrw", ".nef", ".nrw", ".orf", ".ori", ".pef", ".ptx",
-     ".pxn", ".raf", ".raw", ".rw2", ".rwl", ".rwz", ".sr2", ".srf", ".srw", ".sti", ".x3f"});
+    {".3fr", ".ari", ".arw", ".bay", ".cap", ".cr2", ".cr3", ".crw", ".cs1", ".dc2", ".dcr", ".dcs",
+     ".dng", ".drf", ".eip", ".erf", ".fff", ".gpr", ".ia",  ".iiq", ".k25", ".kc2", ".kdc", ".mdc",
+     ".mef", ".mfw", ".mos", ".mrw", ".nef", ".nrw", ".orf", ".ori", ".pef", ".ptx", ".pxn", ".qtk",
+     ".raf", ".raw", ".rdc", ".rw2", ".rwl", ".rwz", ".sr2", ".srf", ".srw", ".sti", ".x3f"});
 
 /// Returns whether a name begins with a dot: some systems store notes on files under such names (._IMG_1.DNG).
 bool is_hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
