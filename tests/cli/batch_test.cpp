@@ -132,6 +132,7 @@ TEST_F(Batch, AFolderStandsForTheRawFilesInIt) {
   fs::create_directories(file("empty"));
   refused(lowlux({"develop", file("empty"), "-o", file("out/")}), "no raw files", 1);
   refused(lowlux({"develop", file("raws"), "-o", file("x.png"), "--quiet"}), "2 raw files need a folder");
+  refused(lowlux({"develop", file("raws"), "-o", "-", "--quiet"}), "2 raw files need a folder as output: 'FOLDER/'");
   refused(lowlux({"develop", file("none*.dng"), "-o", file("out/")}), "no file matches", 1);
 }
 

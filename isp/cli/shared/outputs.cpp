@@ -82,7 +82,9 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
   if (!inputs) return tl::make_unexpected(inputs.error());
   if (inputs->size() > 1 && !folder) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("{} raw files need a folder as output: '{}/'", inputs->size(), args.output), "-o");
+                fmt::format("{} raw files need a folder as output: '{}/'", inputs->size(),
+                            is_standard_stream(args.output) ? "FOLDER" : args.output),
+                "-o");
   }
   if (const auto wrong = wrong_streams(args)) return fail(ErrorCode::invalid_argument, *wrong);
   std::vector<Job> jobs;
