@@ -175,6 +175,17 @@ TEST_F(Config, AFileOfMoreThanItMayHoldIsRefused) {
   EXPECT_TRUE(holds(result.err, file("lowlux/config"))) << result.err;
 }
 
+TEST_F(Config, ALinkToItselfIsNoAbsentFile) {
+  write("");
+  std::filesystem::remove(file("lowlux/config"));
+  EXPECT_EQ(develop().exit_code, 0);
+  std::filesystem::create_symlink("config", file("lowlux/config"));
+  const auto result = develop();
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_TRUE(holds(result.err, file("lowlux/config"))) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+}
+
 TEST_F(Config, HelpAndDoctorWorkWithABrokenFile) {
   write("[develop]\nexposre = 1\n[fry]\n");
   const auto doctor = run({"doctor"});

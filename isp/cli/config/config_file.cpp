@@ -150,8 +150,9 @@ Result<std::vector<ConfigLine>> parse_config(std::string_view text, const std::s
 }
 
 Result<std::vector<ConfigLine>> read_config(const std::string& file) {
-  std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) return std::vector<ConfigLine>();
+  std::error_code error;
+  const bool is_there = std::filesystem::exists(file, error) || error == std::errc::too_many_symbolic_link_levels;
+  if (!is_there) return std::vector<ConfigLine>();
   const auto bytes = capture::read_file_bytes(file, max_bytes);
   if (!bytes) return fail(bytes.error().code, bytes.error().message, file);
   return parse_config(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()), file);
