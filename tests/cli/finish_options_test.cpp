@@ -74,6 +74,8 @@ TEST_F(FinishOptions, WhiteBalanceTakesPresetsTintsGainsAndPixels) {
   EXPECT_NEAR(white("tungsten")["cct_k"].get<double>(), 2856, 3);
   EXPECT_NEAR(white("shade")["cct_k"].get<double>(), 7504, 8);
   EXPECT_NEAR(white("fluorescent")["duv"].get<double>(), 0.0018, 2e-4);
+  EXPECT_EQ(white("Shade"), white("shade"));
+  EXPECT_EQ(white("AUTO"), white("auto"));
   EXPECT_EQ(white("5500"), white("5500K,0"));
   EXPECT_NEAR(white("5500,30")["duv"].get<double>() - white("5500")["duv"].get<double>(), 0.01, 1e-5);
   EXPECT_EQ(white("2,1,1.5")["rule"], "gains");

@@ -100,8 +100,9 @@ OptionStore store_in_range(double least, double most, const char* unit, double& 
 
 std::optional<std::string> set_white_balance(const std::string& text, Choice& choice) {
   static const Names<Choice> names = named_choices();
-  if (const auto named = names.find(text); named != names.end()) {
-    choice = named->second;
+  for (const auto& [name, named] : names) {
+    if (!same_letters(name, text)) continue;
+    choice = named;
     return std::nullopt;
   }
   for (const auto read : {temperature_of, gains_of, picked_of}) {

@@ -28,10 +28,6 @@ namespace {
 
 constexpr std::string_view blank_characters = " \t";
 
-bool same_letters(std::string_view a, std::string_view b) {
-  return std::ranges::equal(a, b, {}, ascii_lower, ascii_lower);
-}
-
 /// Returns the text without its unit, which follows it, or precedes it if the unit ends with a slash.
 std::string_view without_unit(std::string_view text, std::string_view unit) {
   if (unit.empty() || text.size() <= unit.size()) return text;
@@ -106,6 +102,10 @@ std::optional<std::string> set_shard(std::string_view text, Shard& shard) {
 }
 
 }  // namespace
+
+bool same_letters(std::string_view a, std::string_view b) {
+  return std::ranges::equal(a, b, {}, ascii_lower, ascii_lower);
+}
 
 std::optional<double> number_of(std::string_view text) {
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);

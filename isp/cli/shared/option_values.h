@@ -23,6 +23,9 @@ namespace lowlux::cli {
 
 struct Defaults;
 
+/// Returns whether two texts differ at most in the case of letters.
+bool same_letters(std::string_view a, std::string_view b);
+
 /// Returns the entire text as a finite number with a decimal point, with or without a sign; nullopt for other text.
 std::optional<double> number_of(std::string_view text);
 
