@@ -87,7 +87,8 @@ double offset_dn2_of(const calib::NoiseFigures& figures, const RawDn& raw) {
 }
 
 /// Returns the figures of a measurement, with its standard errors as factors.
-calib::NoiseFigures figures_of(const calib::PictureNoise& noise) {
+/// @param has_prior  whether the offset is that of a log-normal prior where the image does not show it
+calib::NoiseFigures figures_of(const calib::PictureNoise& noise, bool has_prior) {
   const double gain = noise.gain_dn_per_e.value, read_dn2 = std::max(noise.offset_dn2.value - quantisation_dn2, 0.0);
   const double gain_error = noise.gain_dn_per_e.standard_error / gain;
   calib::NoiseFigures out{.gain_dn_per_e = gain,
@@ -96,7 +97,7 @@ calib::NoiseFigures figures_of(const calib::PictureNoise& noise) {
                           .read_noise_factor = 1};
   // A measurement that is not above 0 by its error limits the read noise only: half of the limit, within a factor of 2.
   const double limit_dn2 = std::max(noise.offset_dn2.value - quantisation_dn2, 0.0) + noise.offset_dn2.standard_error;
-  if (read_dn2 < noise.offset_dn2.standard_error) {
+  if (has_prior ? read_dn2 == 0 : read_dn2 < noise.offset_dn2.standard_error) {
     out.read_noise_e = std::sqrt(limit_dn2) / gain / 2;
     out.read_noise_factor = 2;
   } else if (read_dn2 > 0) {  // ln R = ln(offset) / 2 - ln K
@@ -169,7 +170,7 @@ NoiseOrigin assume_noise(const BlackPoint& black, std::string unmeasurable, RawF
   double offset_dn2 = offset_dn2_of(*out.figures, raw);
   bool is_denoised = false;
   if (const auto fitted = calib::fit_picture_noise(raw, black.pedestal_dn, prior_of(*out.figures, raw), {}, executor)) {
-    const calib::NoiseFigures expected = std::exchange(*out.figures, figures_of(*fitted));
+    const calib::NoiseFigures expected = std::exchange(*out.figures, figures_of(*fitted, true));
     out.prior_ratio = fitted->prior_ratio;
     is_denoised = fitted->prior_ratio < 1 && fitted->traces.denoised;
     out.doubts = fitted->reasons;
@@ -260,7 +261,7 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
   if (given) return use_given(*given, *black, frame);
   const auto noise = calib::fit_picture_noise(frame.raw, black->pedestal_dn, {}, executor);
   if (noise) {
-    const calib::NoiseFigures figures = figures_of(*noise);
+    const calib::NoiseFigures figures = figures_of(*noise, false);
     const double offset_dn2 = std::max(noise->offset_dn2.value, offset_dn2_of(figures, frame.raw));
     frame.noise = profile_of(noise->gain_dn_per_e.value, offset_dn2, frame.raw, *black, NoiseProfile::Source::picture);
     NoiseOrigin out{.source = NoiseOrigin::Source::picture, .figures = figures, .doubts = noise->reasons};

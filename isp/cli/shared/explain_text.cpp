@@ -15,8 +15,8 @@ void add_noise(Lines& out, const isp::NoiseReduction& noise, const std::optional
   if (noise.snr) {
     const auto& variance = noise.noise.variance_e2;
     out.add("noise", origin ? origin_text(*origin) : fmt::format("of the {}", name_of(noise.source)));
-    out.add("", fmt::format("without light {:.3g} {:.3g} {:.3g} e- (R, G, B)", std::sqrt(variance[0]),
-                            std::sqrt(variance[1]), std::sqrt(variance[2])));
+    out.add("", fmt::format("without light, with quantisation: {:.3g} {:.3g} {:.3g} e- (R, G, B)",
+                            std::sqrt(variance[0]), std::sqrt(variance[1]), std::sqrt(variance[2])));
     if (origin && !origin->unmeasurable.empty()) out.add("", "not measured on the image: " + origin->unmeasurable);
     for (const std::string& doubt : origin ? origin->doubts : std::vector<std::string>()) out.add("", "note: " + doubt);
     if (noise.noise_ratio) out.add("", ratio_text(*noise.noise_ratio));

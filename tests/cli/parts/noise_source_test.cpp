@@ -117,6 +117,27 @@ TEST_F(NoiseSourceOrder, IsGivenThenProfileThenFileThenPictureThenWhatIsKnown) {
   EXPECT_EQ(source_of(raspberry), Source::raspberry_pi);
 }
 
+TEST_F(NoiseSourceOrder, AssumedReadNoiseIsThatOfTheModelWithoutQuantisation) {
+  for (const double read_noise_e : {1.5, 4.0, 12.0}) {
+    for (const bool is_raspberry : {false, true}) {
+      SensorModel sensor = sensor_;
+      sensor.read_noise_e = read_noise_e;
+      RawFrame frame = frame_of(sensor, 40, true, 1);
+      frame.raw.info.iso = 100;
+      frame.raw.info.make = is_raspberry ? "Raspberry Pi" : "Acme";
+      frame.raw.info.model = is_raspberry ? "/base/soc/i2c0mux/i2c@1/imx477@1a" : "Two";
+      const auto origin = found(frame);
+      ASSERT_TRUE(origin && origin->figures);
+      EXPECT_EQ(origin->source, is_raspberry ? Source::raspberry_pi : Source::sensor_class);
+      const double read_dn2 = frame.noise->offset[1] * 12'000 * 12'000 - 1.0 / 12;
+      EXPECT_NEAR(origin->figures->read_noise_e, std::sqrt(read_dn2) / origin->figures->gain_dn_per_e, 1e-6);
+      std::vector<std::string> ignored;
+      const NoiseOrigin known = known_noise(frame.raw, 12'000, ignored);
+      EXPECT_LE(origin->figures->read_noise_factor, known.figures->read_noise_factor);
+    }
+  }
+}
+
 TEST_F(NoiseSourceOrder, SkipsATableThatCannotBeReadWithAWarning) {
   install_darktable("{ not JSON");
   RawFrame frame = frame_of(sensor_, 40, true, 3);
