@@ -53,6 +53,15 @@ isp::NoiseSourcePlan with_free_effects(isp::NoiseSourcePlan plan) {
   return plan;
 }
 
+/// Returns the name of the camera: that of the sensor, as the ISO states the gain setting. Where it does not, because
+/// the setting has another name or other options determine the ISO, the gain setting follows.
+std::string model_of(const SyntheticCamera& camera) {
+  const isp::NamedSensor& sensor = camera.sensor;
+  const bool iso_is_setting = sensor.iso && !sensor.iso_given && std::lround(camera.iso) == std::lround(*sensor.iso);
+  if (iso_is_setting || sensor.gain_setting.empty()) return sensor.model.name;
+  return sensor.model.name + " " + sensor.gain_setting;
+}
+
 }  // namespace
 
 ExposedSensor::ExposedSensor(SyntheticCamera camera, SensorLight light)
@@ -204,8 +213,7 @@ RawFrame ExposedSensor::described(Plane<std::uint16_t> codes) const {
   out.raw.white_dn.fill(std::round(std::min(65535.0, scale * (s.black_level_dn + range_dn(s) + offset))));
   FrameInfo& info = out.raw.info;
   info.make = "lowlux";
-  const std::string& gain = camera_.sensor.gain_setting;
-  info.model = s.name + (gain.empty() ? "" : " " + gain);
+  info.model = model_of(camera_);
   info.exposure_s = camera_.options.exposure.time_s;
   info.temperature_c = camera_.options.exposure.temperature_c;
   info.f_number = camera_.options.f_number;

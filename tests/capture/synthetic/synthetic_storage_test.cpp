@@ -9,6 +9,7 @@
 
 #include "capture/synthetic/synthetic_source.h"
 #include "isp/model/sensor/scene_luminance.h"
+#include "isp/model/sensor/sensor_db.h"
 #include "isp/model/spectrum/spectral_response.h"
 #include "tests/support/sensor_frames.h"
 #include "tests/support/synthetic_camera.h"
@@ -64,6 +65,30 @@ TEST(SyntheticStorage, WholeCodesAreStoredAsTheyAre) {
   EXPECT_EQ(frame.raw.default_crop, (Rect{0, 0, 32, 32}));
   const Plane<float> dn = source.frame_dn(0, executor);
   for (std::size_t i = 0; i < dn.size(); ++i) EXPECT_EQ(frame.raw.dn.data()[i], dn.data()[i]);
+}
+
+TEST(SyntheticStorage, TheModelNamesGainSettingsThatTheIsoDoesNotState) {
+  InlineExecutor executor;
+  const auto info_of = [&](const isp::NamedSensor& sensor, const isp::Optics& optics) {
+    const auto source = SyntheticSource::of(*flat_scene(test::setup_of(8, 8, 1)), sensor,
+                                            *isp::spectral_response(sensor, optics), {}, executor);
+    EXPECT_TRUE(source) << (source ? "" : source.error().message);
+    return source->frame(0, executor).raw.info;
+  };
+  isp::SensorFigures one_iso;
+  one_iso.iso = 400;
+  for (const std::string gain : {"ISO 100", "ISO 1600"}) {
+    const auto sensor = isp::sensor_named("ELD_NikonD850", gain, {});
+    ASSERT_TRUE(sensor) << sensor.error().message;
+    const FrameInfo info = info_of(*sensor, {2});
+    EXPECT_EQ(info.model, "ELD_NikonD850");
+    EXPECT_NEAR(*info.iso, *sensor->iso, 0.01) << "whole numbers are stored";
+    EXPECT_EQ(info_of(*sensor, {2, 100.0}).model, "ELD_NikonD850 " + gain);
+    EXPECT_EQ(info_of(*isp::sensor_named("ELD_NikonD850", gain, one_iso), {2}).model, "ELD_NikonD850 " + gain);
+  }
+  const auto other = isp::sensor_named("HWK4123_low_gain", "", {});
+  ASSERT_TRUE(other) << other.error().message;
+  EXPECT_EQ(info_of(*other, {2, 100.0}).model, "HWK4123_low_gain 1x");
 }
 
 TEST(SyntheticStorage, WhiteIsTheConverterWhereThatSaturatesFirst) {

@@ -178,6 +178,48 @@ TEST_F(Calibrate, NoiseFindsGainReadNoiseAndFullWell) {
   EXPECT_GT(both["gains"][0]["sensor"]["dark_current_red_e_per_s"]["value"], 10);
 }
 
+TEST_F(Calibrate, NoiseOfTwoIsosIsOneProfileThatDevelopsBoth) {
+  const auto shoot_at = [&](const std::string& iso, const std::string& name, const std::string& scene, int frames,
+                            double luminance) {
+    const auto done = lowlux({"simulate",    scene,
+                              "-o",          file(iso + name + ".dng"),
+                              "--size",      "128x128",
+                              "--gain",      iso,
+                              "--exposure",  "0.1",
+                              "--luminance", std::to_string(1600 / std::stod(iso) * luminance),
+                              "--frames",    std::to_string(frames),
+                              "--no-truth",  "--quiet",
+                              "--effects",   "all",
+                              "--seed",      std::to_string(++seed_)});
+    EXPECT_EQ(done.exit_code, 0) << done.err;
+  };
+  for (const std::string iso : {"100", "1600"}) {
+    shoot_at(iso, "dark", "dark", 4, 0);
+    int n = 0;
+    for (const double luminance : {0.1, 0.2, 0.4, 1.0, 1.6, 2.4}) {
+      shoot_at(iso, "flat" + std::to_string(n++), "flat", 2, luminance);
+    }
+    shoot_at(iso, "night", "chart", 1, 0.5);
+  }
+  const auto done =
+      lowlux({"calibrate", "noise", file("*flat*.dng"), "--darks", file("*dark*.dng"), "-o", file("p.json")});
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const Json found = profile("p.json");
+  EXPECT_EQ(found["model"], "ELD_NikonD850");
+  ASSERT_EQ(found["gains"].size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Json& gain = found["gains"][i];
+    const std::string iso = std::to_string(gain["iso"].get<int>());
+    const Json& measured = gain["sensor"]["system_gain_dn_per_e"];
+    EXPECT_NEAR(measured["value"], iso == "100" ? 0.415 : 6.641, 5 * measured["standard_error"].get<double>());
+    const auto developed =
+        lowlux({"develop", file(iso + "night.dng"), "-o", file(iso + ".png"), "--profile", file("p.json"), "--json"});
+    ASSERT_EQ(developed.exit_code, 0) << developed.err;
+    const Json level = Json::parse(developed.out)[0]["black"]["pedestal_dn"][0];
+    EXPECT_NEAR(level, gain["pedestal_dn"]["site_00"]["value"], 1e-6) << iso;
+  }
+}
+
 TEST_F(Calibrate, OnePictureTellsItsNoiseAndIsHeldAgainstItsFile) {
   const std::string night = file("n.dng");
   const auto made = lowlux({"simulate",
@@ -340,9 +382,9 @@ TEST_F(Calibrate, NoInputAndNoOutputIsReplacedByAnother) {
 }
 
 TEST_F(Calibrate, MapsAreWrittenWithTheProfileOrNotAtAll) {
-  const Words good = joined(shoot("a", "dark", "0.1", 2), shoot("b", "dark", "10", 2));
-  const Words bad =
-      joined(shoot("c", "dark", "0.1", 2, {"--iso", "100"}), shoot("d", "dark", "10", 1, {"--iso", "100"}));
+  const Words high{"--iso", "1600"}, low{"--iso", "100"};
+  const Words good = joined(shoot("a", "dark", "0.1", 2, high), shoot("b", "dark", "10", 2, high));
+  const Words bad = joined(shoot("c", "dark", "0.1", 2, low), shoot("d", "dark", "10", 1, low));
   const Words words{"calibrate", "black", "-o", file("p.json"), "--system-gain", "0.5", "--map", file("m")};
   const auto refused = lowlux(joined(words, joined(good, bad)));
   EXPECT_EQ(refused.exit_code, 1);
