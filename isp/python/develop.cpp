@@ -88,7 +88,9 @@ struct DevelopResult {
 
 DevelopResult developed(const std::vector<Input>& inputs, const std::string& output, bool overwrite,
                         const Words& words) {
-  auto args = parsed(cli::parse_develop, words);
+  auto args = parsed(
+      +[](const std::vector<std::string>& arguments) { return cli::parse_develop(arguments, cli::options_contradict); },
+      words);
   set_call(output, overwrite, args);
   std::optional<std::vector<std::string>> frames;
   if (args.merge) {

@@ -85,6 +85,40 @@ TEST_F(Config, DefaultsThatContradictTheArgumentsAreLeftOut) {
   EXPECT_TRUE(std::filesystem::exists(file("out/n900_dog_small_grbg10in16.jpg")));
 }
 
+// Not known to the parser: isp::check_options finds contradictions of values.
+TEST_F(Config, DefaultsThatAValueOfTheArgumentsExcludesAreLeftOut) {
+  struct Case {
+    const char* lines;
+    Words more;
+    const char* left;  // defaults that are used
+  };
+  for (const Case& c : {Case{"local-tone = 0.5\nquality = 95\n", {"--tone", "none"}, "--quality=95 ("},
+                        Case{"brightness = 0.5\nquality = 95\n", {"--space", "linear-srgb"}, "--quality=95 ("},
+                        Case{"contrast = 1.2\nquality = 95\n", {"--noise-limit", "2"}, "--quality=95 ("},
+                        Case{"quality = 95\ncontrast = 1.2\nlocal-tone = 0.2\nsaturation = 1.1\n",
+                             {"--look", "eye", "--scene-luminance", "1"},
+                             "--quality=95 ("},
+                        Case{"look = eye\nquality = 95\n", {"--brightness", "0.5"}, "--quality=95 ("},
+                        Case{"space = linear-srgb\nquality = 95\n", {"--brightness", "0.5"}, "--quality=95 ("},
+                        Case{"brightness = 0.5\ncontrast = 1.2\n", {"--tone", "standard"}, "--brightness=0.5 --con"}}) {
+    write(std::string("[develop]\n") + c.lines);
+    Words words = c.more;
+    words.emplace_back("--explain");
+    const auto result = develop(words);
+    EXPECT_EQ(result.exit_code, 0) << c.lines << result.err;
+    EXPECT_TRUE(result.out.starts_with(std::string("defaults: ") + c.left)) << c.lines << result.out;
+  }
+}
+
+TEST_F(Config, ContradictionsNameTheLineOfADefaultOnlyWhereTheFileIsAtFault) {
+  refused("[develop]\nquality = 95\nspace = linear-srgb\nbrightness = 0.5\n", 4, "not with --tone none, linear spaces");
+  refused("[develop]\ntone = none\nlocal-tone = 0.5\n", 2, "--local-tone requires the standard tone curve");
+  write("[develop]\ncontrast = 1.2\n");
+  const auto result = develop({"--brightness", "0.5", "--tone", "none"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_TRUE(result.err.starts_with("lowlux develop: --brightness and --contrast shape")) << result.err;
+}
+
 TEST_F(Config, WrongLinesAreNamed) {
   refused("[develop]\nexposre = 1\n", 2, "develop has no option 'exposre' (did you mean exposure");
   refused("[devlop]\n", 1, "there is no verb 'devlop'");

@@ -117,7 +117,7 @@ TEST_F(FinishOptions, AdjustmentsTakeNumbersInTheirRange) {
   for (const char* text : {"0.2", "2", "on", "-1"}) refused({"--sharpen", text}, 2, "--sharpen");
   for (const char* text : {"-0.1", "1.1", "nan", "on", ""}) refused({"--local-tone", text}, 2, "--local-tone");
   refused({"--highlights", "rebuild"}, 2, "--highlights");
-  refused({"--tone", "none", "--local-tone", "0.5"}, 2, "local tone");
+  refused({"--tone", "none", "--local-tone", "0.5"}, 2, "--local-tone requires");
   refused({"--tone", "none", "--contrast", "1.2"}, 2, "tone curve");
   refused({"--look", "eye", "--scene-luminance", "1", "--saturation", "2"}, 2, "saturation");
 }

@@ -158,7 +158,8 @@ Result<std::vector<ConfigLine>> read_config(const std::string& file) {
   return parse_config(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()), file);
 }
 
-Result<Defaults> find_defaults(const CLI::App& app, const std::vector<std::string>& words) {
+Result<Defaults> find_defaults(const CLI::App& app, const std::vector<std::string>& words,
+                               const std::set<std::string>& left_out) {
   const Options given = given_options(app, words);
   const auto file = config_file();
   const bool general =
@@ -178,13 +179,28 @@ Result<Defaults> find_defaults(const CLI::App& app, const std::vector<std::strin
     if (!seen.insert(line.option).second) {
       return fail(ErrorCode::invalid_argument, fmt::format("{} is set twice", line.option), place);
     }
-    if (word->empty() || given.contains(*option) || is_excluded(**option, given)) continue;
-    candidates.push_back({*option, {"--" + line.option, *word, place}});
+    const std::string flag = "--" + line.option;
+    const bool is_open = !given.contains(*option) && !is_excluded(**option, given) && !left_out.contains(flag);
+    if (!word->empty() && is_open) candidates.push_back({*option, {flag, *word, place}});
   }
   remove_needy(given, candidates);
   Defaults defaults{.file = candidates.empty() ? "" : *file};
   for (Candidate& candidate : candidates) defaults.items.push_back(std::move(candidate.item));
   return defaults;
+}
+
+std::set<std::string> excluded_defaults(const Defaults& defaults,
+                                        const std::function<bool(const std::set<std::string>& left_out)>& contradicts) {
+  std::set<std::string> excluded;
+  if (defaults.items.empty() || !contradicts({})) return excluded;
+  std::set<std::string> others;
+  for (const Defaults::Item& item : defaults.items) others.insert(item.flag);
+  for (const Defaults::Item& item : defaults.items) {
+    others.erase(item.flag);
+    if (contradicts(others)) excluded.insert(item.flag);
+    others.insert(item.flag);
+  }
+  return excluded;
 }
 
 std::string default_place(const CLI::App& app, std::string_view text) {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -46,8 +48,16 @@ Result<std::vector<ConfigLine>> read_config(const std::string& file);
 /// Returns the defaults of a verb that the arguments leave open: none with --no-config or help, nor for `doctor`, which
 /// reports the file itself; none of an option that is given, that excludes a given one, or that needs one that is
 /// neither given nor a default that is used.
+/// @param left_out  flags whose defaults are not used
 /// Errors, with FILE:LINE as their place: those of read_config; an option that the verb does not have.
-Result<Defaults> find_defaults(const CLI::App& app, const std::vector<std::string>& words);
+Result<Defaults> find_defaults(const CLI::App& app, const std::vector<std::string>& words,
+                               const std::set<std::string>& left_out = {});
+
+/// Returns the flags of the defaults that the arguments exclude: each contradicts the arguments without the other
+/// defaults. None if arguments and defaults do not contradict each other.
+/// @param contradicts  whether the arguments and the defaults contradict each other, without those of these flags
+std::set<std::string> excluded_defaults(const Defaults& defaults,
+                                        const std::function<bool(const std::set<std::string>& left_out)>& contradicts);
 
 /// Returns the place "FILE:LINE" of the default that an error is about, once the app was parsed, or by the defaults
 /// that were used: the first whose option the text names. Empty: none is.

@@ -1,6 +1,7 @@
 #include "isp/cli/develop/develop_args.h"
 
 #include <cmath>
+#include <set>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -46,13 +47,15 @@ void add_output(CLI::App& app, DevelopArgs& args) {
   add_samples(app, args);
 }
 
-Parsed<DevelopArgs> parse(CLI::App& app, const std::vector<std::string>& words, DevelopArgs& args) {
-  if (const auto code = parse_words(app, words, &args.defaults)) return *code;
+Parsed<DevelopArgs> parse(CLI::App& app, const std::vector<std::string>& words, DevelopArgs& args,
+                          const std::set<std::string>& left_out = {}) {
+  if (const auto code = parse_words(app, words, &args.defaults, left_out)) return *code;
   return args;
 }
 
-Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& words, DevelopArgs& args) {
-  Parsed<DevelopArgs> parsed = parse(app, words, args);
+Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& words, DevelopArgs& args,
+                                const std::set<std::string>& left_out = {}) {
+  Parsed<DevelopArgs> parsed = parse(app, words, args, left_out);
   const isp::DenoiseChoice& choice = args.options.denoise;
   if (std::holds_alternative<DevelopArgs>(parsed) && choice.maps && choice.mode == isp::DenoiseChoice::Mode::off) {
     return refuse(app, "--maps describes the result of --denoise and cannot be combined with --denoise off");
@@ -63,11 +66,10 @@ Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& w
   return parsed;
 }
 
-}  // namespace
+constexpr const char *develop_summary = "Develops raw files to images.", *develop_name = "lowlux develop";
 
-Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
-  CLI::App app("Develops raw files to images.", "lowlux develop");
-  DevelopArgs args;
+/// Adds all options of `develop`.
+void add_develop(CLI::App& app, DevelopArgs& args) {
   add_output(app, args);
   add_rendering(app, args);
   add_adjustments(app, args.options);
@@ -100,7 +102,27 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
             "--calibrate-cost), their time",
             args);
   app.get_option("--shard")->excludes(merge);
-  Parsed<DevelopArgs> parsed = parse_batch(app, words, args);
+}
+
+/// Returns the flags of the defaults that the arguments of `develop` exclude.
+std::set<std::string> excluded_by(const std::vector<std::string>& words, const Defaults& defaults,
+                                  const std::function<bool(const DevelopArgs&)>& contradicts) {
+  return excluded_defaults(defaults, [&](const std::set<std::string>& left_out) {
+    CLI::App app(develop_summary, develop_name);
+    DevelopArgs args;
+    add_develop(app, args);
+    return !parse_words(app, words, &args.defaults, left_out) && contradicts(args);
+  });
+}
+
+/// Parses the arguments of `develop`, and prints what is wrong.
+/// @param left_out  flags whose defaults are not used
+Parsed<DevelopArgs> parse_develop_without(const std::set<std::string>& left_out,
+                                          const std::vector<std::string>& words) {
+  CLI::App app(develop_summary, develop_name);
+  DevelopArgs args;
+  add_develop(app, args);
+  Parsed<DevelopArgs> parsed = parse_batch(app, words, args, left_out);
   if (auto* const good = std::get_if<DevelopArgs>(&parsed)) {
     if (const auto wrong = complete_look(good->look, Planner::of_everything, good->options.look)) {
       return refuse(app, *wrong);
@@ -112,6 +134,17 @@ Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words) {
     }
   }
   return parsed;
+}
+
+}  // namespace
+
+Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words,
+                                  const std::function<bool(const DevelopArgs&)>& contradicts) {
+  Parsed<DevelopArgs> parsed = parse_develop_without({}, words);
+  const auto* const good = std::get_if<DevelopArgs>(&parsed);
+  const std::set<std::string> excluded =
+      good != nullptr ? excluded_by(words, good->defaults, contradicts) : std::set<std::string>();
+  return excluded.empty() ? parsed : parse_develop_without(excluded, words);
 }
 
 Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {

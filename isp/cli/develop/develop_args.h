@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <variant>
@@ -92,7 +93,10 @@ struct ReproduceArgs {
 template <class Args>
 using Parsed = std::variant<Args, int>;
 
-Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words);
+/// @param contradicts  whether options cannot be combined: defaults of the user's file are then left out, see
+///                     excluded_defaults
+Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words,
+                                  const std::function<bool(const DevelopArgs&)>& contradicts);
 Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words);
 Parsed<DevelopArgs> parse_merge(const std::vector<std::string>& words);
 Parsed<InfoArgs> parse_info(const std::vector<std::string>& words);

@@ -27,7 +27,7 @@ std::vector<Job> jobs_of(const std::vector<std::string>& frames, const std::vect
 }  // namespace
 
 int run_develop(const std::vector<std::string>& words) {
-  Parsed<DevelopArgs> parsed = parse_develop(words);
+  Parsed<DevelopArgs> parsed = parse_develop(words, options_contradict);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   auto& args = std::get<DevelopArgs>(parsed);
 

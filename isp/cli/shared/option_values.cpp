@@ -230,7 +230,8 @@ const CLI::Option* empty_option(const CLI::App& app) {
 
 }  // namespace
 
-std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words, Defaults* used) {
+std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words, Defaults* used,
+                               const std::set<std::string>& left_out) {
   app.set_help_flag("-h,--help", "print the most used options")->group("General");
   app.set_help_all_flag("--help-all", "print all options")->group("General");
   bool no_config = false;  // find_defaults looks for the flag itself: defaults are arguments of the parser
@@ -245,7 +246,7 @@ std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& wo
     const std::string flag = word.substr(0, word.size() - 1);
     if (app.get_option_no_throw(flag) != nullptr) return refuse(app, flag + " has no value");
   }
-  const Result<Defaults> defaults = find_defaults(app, words);
+  const Result<Defaults> defaults = find_defaults(app, words, left_out);
   if (!defaults) return print_failure(defaults.error()), exit_usage;
   try {
     parse_all(app, words, *defaults);

@@ -5,6 +5,7 @@
 #include <functional>
 #include <initializer_list>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -107,7 +108,9 @@ int refuse(const CLI::App& app, const std::string& wrong);
 
 /// Parses the arguments after a verb. @return nullopt if they are valid, else the exit code, after help or an error was
 /// printed
-/// @param used  receives the defaults of the user's file that complete the arguments; nullptr: not of interest
-std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words, Defaults* used = nullptr);
+/// @param used      receives the defaults of the user's file that complete the arguments; nullptr: not of interest
+/// @param left_out  flags whose defaults are not used
+std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words, Defaults* used = nullptr,
+                               const std::set<std::string>& left_out = {});
 
 }  // namespace lowlux::cli

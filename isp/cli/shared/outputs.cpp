@@ -152,6 +152,14 @@ Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, FileFormat
   return o;
 }
 
+bool options_contradict(const DevelopArgs& args) {
+  const Result<FileFormat> format = format_of_output(args, names_folder(args) ? "-" : args.output);
+  if (!format || !picture_kind(*format, args.bits, args.space)) return false;
+  DevelopArgs completed = args;
+  const auto wrong = complete_look(args.look, Planner::of_everything, completed.options.look);
+  return !wrong && !complete_options(completed, *format);
+}
+
 namespace fs = std::filesystem;
 
 Result<void> check_place(const std::string& file, bool force) {

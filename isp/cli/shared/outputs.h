@@ -48,6 +48,10 @@ Result<PictureKind> picture_kind(isp::FileFormat format, std::optional<int> bits
 /// options.
 Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, isp::FileFormat format);
 
+/// Returns whether options cannot be combined, see isp::check_options. A depth or a space that the format of the output
+/// does not support is no such contradiction.
+bool options_contradict(const DevelopArgs& args);
+
 /// Checks before any work that a file can be written; the writers check again.
 /// Errors: its folder is missing; it is a folder itself; it exists, and `force` is not given.
 Result<void> check_place(const std::string& file, bool force);
