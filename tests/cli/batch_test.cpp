@@ -234,6 +234,35 @@ TEST_F(Batch, TwoInputsForOneOutputAreRefusedWithARemedy) {
   EXPECT_FALSE(fs::exists(file("out")));
 }
 
+TEST_F(Batch, InputsOfOneNameHaveOutputsNamedWithTheirExtensions) {
+  raw("a.dng");
+  copies("a.dng", {"in/a.dng", "in/a.nef", "in/b.dng", "other/a.dng"});
+  const std::vector<std::string> names{"a_dng.jpg", "a_nef.jpg", "b.jpg"};
+  const std::vector<std::string> words{"develop", file("in"), "-o", file("out/"), "--format", "jpg"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), words.begin(), words.end());
+    return lowlux(more);
+  };
+  const auto result = with({});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(
+      result.err.starts_with("lowlux: raw files of one name have outputs named with their extensions, such as " +
+                             file("out/a_dng.jpg") + "\n"))
+      << result.err;
+  EXPECT_EQ(names_in("out"), names);
+  fs::remove(file("out/a_nef.jpg"));
+  const auto rest = with({"--skip-existing", "--quiet", "--json"});
+  EXPECT_EQ(rest.exit_code, 0) << rest.err;
+  EXPECT_EQ(rest.err, "");
+  const Json report = Json::parse(rest.out);
+  EXPECT_TRUE(report[0].contains("skipped") && !report[1].contains("skipped") && report[2].contains("skipped"))
+      << report;
+  EXPECT_EQ(names_in("out"), names);
+  refused(with({file("other/a.dng")}), "out/a_dng.jpg would be written twice");
+  EXPECT_EQ(lowlux({"denoise", file("in"), "-o", file("clean/"), "--quiet"}).err, "");
+  EXPECT_EQ(names_in("clean"), (std::vector<std::string>{"a_dng.dng", "a_nef.dng", "b.dng"}));
+}
+
 TEST_F(Batch, OptionsTakeOneArgumentAndLeaveTheRest) {
   raw("a.dng");
   simulated("dark", "d.dng", {"--exposure", "0.1", "--no-truth", "--seed", "5"});

@@ -1,11 +1,15 @@
 #include "isp/cli/shared/outputs.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/noise_maps.h"
 #include "isp/cli/shared/raw_files.h"
 #include "isp/cli/shared/standard_streams.h"
@@ -63,6 +67,42 @@ tl::unexpected<Error> written_twice(const std::string& output, const std::string
       "-o");
 }
 
+/// Returns the name of an input without folder and extension, and the extension without its dot.
+std::pair<std::string, std::string> name_and_extension(const std::string& input) {
+  if (is_standard_stream(input)) return {"stdin", ""};
+  const fs::path path(input);
+  return {path.stem().string(), path.has_extension() ? path.extension().string().substr(1) : ""};
+}
+
+/// Names the outputs of inputs in a folder, without extension.
+class OutputNames {
+ public:
+  explicit OutputNames(const std::vector<std::string>& inputs) {
+    for (const std::string& input : inputs) {
+      const auto [name, extension] = name_and_extension(input);
+      extensions_[name].insert(extension);
+    }
+  }
+
+  /// Returns the name of the input, followed by its extension if there are inputs of that name with others.
+  std::string of(const std::string& input) const {
+    const auto [name, extension] = name_and_extension(input);
+    return extension.empty() || extensions_.at(name).size() == 1 ? name : name + "_" + extension;
+  }
+
+ private:
+  std::map<std::string, std::set<std::string>> extensions_;  // by name
+};
+
+void print_extended_names(const std::vector<Job>& jobs) {
+  const auto extended = std::ranges::find_if(
+      jobs, [](const Job& job) { return fs::path(job.output).stem() != name_and_extension(job.input).first; });
+  if (extended == jobs.end()) return;
+  print_err(one_line(fmt::format("lowlux: raw files of one name have outputs named with their extensions, such as {}",
+                                 extended->output)) +
+            "\n");
+}
+
 }  // namespace
 
 bool names_folder(const DevelopArgs& args) {
@@ -88,12 +128,13 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
   }
   if (const auto wrong = wrong_streams(args)) return fail(ErrorCode::invalid_argument, *wrong);
   std::vector<Job> jobs;
+  const OutputNames names(*inputs);
   std::map<std::string, std::string> input_of;  // by file that is written
   for (const std::string& input : *inputs) {
     std::string output = args.output;
     if (folder) {
-      const fs::path stem = is_standard_stream(input) ? fs::path("stdin") : fs::path(input).stem();
-      output = (fs::path(args.output) / stem).string() + "." + (args.format.empty() ? extension : args.format);
+      const std::string ending = "." + (args.format.empty() ? extension : args.format);
+      output = (fs::path(args.output) / names.of(input)).string() + ending;
     }
     std::vector<std::string> files{output};
     if (args.options.denoise.maps) {
@@ -108,6 +149,7 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
     }
     jobs.push_back({input, output});
   }
+  if (folder && !args.quiet) print_extended_names(jobs);
   return jobs;
 }
 

@@ -19,10 +19,11 @@ struct Job {
 };
 
 /// Returns the output of each input: `output` itself for one, files in it where it is a folder (it exists as one or
-/// ends with /), with `extension` unless the arguments name a format. Inputs that are folders stand for the raw files
-/// in them, and - for standard input and output. Errors: those of wrong_streams; those of raw_files_of; with
-/// ErrorCode::invalid_argument (invalid arguments) several inputs and no folder, two inputs for one image, an image
-/// that would replace its own raw file.
+/// ends with /), with `extension` unless the arguments name a format. Inputs of one name with several extensions have
+/// outputs named with these, as one_nef.png and one_dng.png, which is printed unless the arguments are quiet. Inputs
+/// that are folders stand for the raw files in them, and - for standard input and output. Errors: those of
+/// wrong_streams; those of raw_files_of; with ErrorCode::invalid_argument (invalid arguments) several inputs and no
+/// folder, two inputs for one image, an image that would replace its own raw file.
 Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string& extension);
 
 /// Checks outputs. Error (invalid arguments): an output that would replace one of the files that are only read.
