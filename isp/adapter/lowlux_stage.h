@@ -209,7 +209,7 @@ typedef struct {
   float max_exposure_s;         /* limits of the exposure that the result advises, 1e-7..1e5: motion blur, frame rate */
   float min_exposure_s;         /* 0..max_exposure_s */
   float max_gain;               /* 1..1e4; 0: no limit */
-  float clipped_fraction;       /* fraction of the pixels that may clip, 1e-9..0.5; 0: 0.001 */
+  float clipped_fraction;       /* upper limit of clipped pixels in the fullest channel, 1e-9..0.5; 0: 0.001 */
   int32_t mains_hz; /* mains whose flicker exposures average out: 50, 60, LOWLUX_STAGE_MAINS_EITHER; 0: none */
 } lowlux_stage_params;
 

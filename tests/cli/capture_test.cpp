@@ -96,6 +96,10 @@ TEST_F(CaptureCommand, RefusesLimitsOfAutomaticExposureThatMeanNothing) {
   }
 }
 
+TEST_F(CaptureCommand, HelpStatesInWhichChannelClippedPixelsAreLimited) {
+  EXPECT_NE(lowlux({"capture", "--help-all"}).out.find("fullest"), std::string::npos);
+}
+
 TEST_F(CaptureCommand, SaysInOneLineThatThereIsNoSuchCamera) {
   refused({"--v4l2", "/dev/video9999", "-o", file("a.png")}, "/dev/video9999", 1);
   refused({"--v4l2", "/dev/null", "-o", file("a.dng")}, "/dev/null", 1);

@@ -62,7 +62,9 @@ void add_auto_exposure(CLI::App& app, AutoExposureArgs& args) {
       {{"auto", isp::Mains::either}, {"50", isp::Mains::hz50}, {"60", isp::Mains::hz60}, {"off", isp::Mains::off}},
       [&args](isp::Mains mains) { args.mains = mains; },
       "with --auto-exposure: mains frequency whose flicker is avoided (default auto: 50 and 60 Hz)");
-  add_text(app, "--clip", "FRACTION", "with --auto-exposure: fraction of pixels that may clip (default 0.001)",
+  add_text(app, "--clip", "FRACTION",
+           "with --auto-exposure: upper limit of the fraction of clipped pixels in the fullest channel, noise included "
+           "(default 0.001)",
            store_within(args.clipped_fraction, 1e-9, 0.5, ""));
   add_text(app, "--gain-codes", "CODE=X,...", "with --auto-exposure: gain codes of a V4L2 camera, and their factors",
            [&args](const std::string& text) { return set_gain_codes(text, args.gain_codes); });

@@ -39,8 +39,10 @@ struct ExposureLimits {
   double longest_s = 0;                                         // by motion blur and frame rate
   double max_factor = std::numeric_limits<double>::infinity();  // of the gains; the lowest gain is used in any case
   Mains mains = Mains::off;
-  double clipped_fraction = 1e-3;  // of the pixels, which the highlight may clip; 1e-9..0.5
-  double temperature_c = 20;       // of the sensor, for its dark current
+  /// Upper limit of the fraction of clipped pixels, 1e-9..0.5: so many pixels of the fullest channel may exceed, noise
+  /// included, the full well or the range without metering_headroom. Of all pixels fewer clip.
+  double clipped_fraction = 1e-3;
+  double temperature_c = 20;  // of the sensor, for its dark current
 };
 
 struct ExposureSetting {

@@ -11,9 +11,9 @@ namespace lowlux::isp {
 /// Holds the codes of one frame that decide on the exposure of the next ones, above black.
 struct MeteredCodes {
   double midtone_dn = 0;  // median of the channel with most signal
-  double highlight_dn =
-      0;                // which ExposureLimits::clipped_fraction of the pixels exceed, in the channel that is fullest
-  double range_dn = 0;  // white less black
+  /// Code that ExposureLimits::clipped_fraction of the pixels of the fullest channel exceed, noise included.
+  double highlight_dn = 0;
+  double range_dn = 0;          // white less black
   double clipped_fraction = 0;  // of the pixels, in the channel with most: codes of white or above
 };
 
