@@ -22,6 +22,7 @@ struct State {
   lowlux_stage* stage = nullptr;
   std::optional<BayerCaps> in;
   std::optional<OutputCaps> out;
+  const char* warning = nullptr;  // that was posted last
 };
 
 struct Element {
@@ -240,10 +241,26 @@ class MappedOutput {
   bool is_frame_ = false, mapped_ = false;
 };
 
+/// Posts a warning about a property without effect, once until it changes.
+void warn(GstBaseTransform* element, const Properties& properties) {
+  const char* const warning = properties.without_effect();
+  if (warning != nullptr && warning != state_of(element).warning) {
+    GST_ELEMENT_WARNING(element, RESOURCE, SETTINGS, ("%s", warning), (nullptr));
+  }
+  state_of(element).warning = warning;
+}
+
+/// Returns what is wrong with a frame; advice is on properties of the element.
+const char* error_text(const lowlux_stage* stage, int code) {
+  if (code != LOWLUX_STAGE_UNKNOWN_LIGHT) return lowlux_stage_last_error(stage);
+  return "the look of the eye needs the luminance of the scene: set lux, or exposure-time, f-number and analogue-gain";
+}
+
 /// Processes one mapped frame. @return a code of lowlux_stage.h
 int process(GstBaseTransform* element, GstBuffer* in, const GstMapInfo& bytes, const lowlux_stage_picture& picture) {
   State& state = state_of(element);
   const Properties properties = locked_properties(element);
+  warn(element, properties);
   lowlux_stage_params params = properties.params();
   if (GST_BUFFER_PTS_IS_VALID(in)) {
     params.timestamp_ns = GST_BUFFER_PTS(in);
@@ -280,7 +297,7 @@ GstFlowReturn transform(GstBaseTransform* element, GstBuffer* in, GstBuffer* out
   }
   gst_buffer_unmap(in, &bytes);
   if (code >= 0) return GST_FLOW_OK;
-  GST_ELEMENT_ERROR(element, STREAM, DECODE, ("%s", lowlux_stage_last_error(state.stage)),
+  GST_ELEMENT_ERROR(element, STREAM, DECODE, ("%s", error_text(state.stage, code)),
                     ("code %d for a frame of %" G_GSIZE_FORMAT " bytes", code, bytes.size));
   return GST_FLOW_ERROR;
 }

@@ -36,6 +36,8 @@ struct Properties {
 
   lowlux_stage_settings settings() const;
   lowlux_stage_params params() const;
+  /// Returns that a property has no effect because the one it requires is not known, in words; nullptr: none is.
+  const char* without_effect() const;
 };
 
 /// Adds the properties to a class of elements; set_property and get_property have to be set before.

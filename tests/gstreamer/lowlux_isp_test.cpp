@@ -130,9 +130,10 @@ class Reference {
   std::size_t stride_ = 0;
 };
 
-Harness harness_of(const Stream& stream, bool temporal = false) {
+Harness harness_of(const Stream& stream, bool temporal = false, const char* look = "camera") {
   GstElement* element = gst_element_factory_make("lowluxisp", nullptr);
   g_object_set(element, "temporal", static_cast<gboolean>(temporal), nullptr);
+  gst_util_set_object_arg(G_OBJECT(element), "look", look);
   Harness harness(gst_harness_new_with_element(element, "sink", "src"));
   gst_object_unref(element);
   gst_harness_set_sink_caps_str(harness.get(), stream.source_caps().c_str());
@@ -319,6 +320,52 @@ TEST(LowluxIsp, RefusesABufferThatEndsBeforeTheFrame) {
   EXPECT_EQ(error_on(bus.get()), "the input ends before the frame does");
   const Bytes whole = frame_of(stream, 1);
   EXPECT_EQ(gst_harness_push(harness.get(), buffer_of(whole, 1)), GST_FLOW_OK) << "the next frame is processed";
+  gst_element_set_bus(harness->element, nullptr);
+}
+
+TEST(LowluxIsp, NamesItsPropertiesWhereTheLuminanceOfTheSceneIsUnknown) {
+  const Stream stream;
+  const Bytes bytes = frame_of(stream, 1);
+  const Harness harness = harness_of(stream, false, "eye");
+  const Bus bus(gst_bus_new());
+  gst_element_set_bus(harness->element, bus.get());
+  EXPECT_EQ(gst_harness_push(harness.get(), buffer_of(bytes, 0)), GST_FLOW_ERROR);
+  const std::string error = error_on(bus.get());
+  for (const char* name : {"lux", "exposure-time", "f-number", "analogue-gain"}) {
+    EXPECT_NE(error.find(name), std::string::npos) << error;
+  }
+  EXPECT_EQ(error.find("--"), std::string::npos) << error;
+  g_object_set(harness->element, "lux", 10.0, nullptr);
+  EXPECT_EQ(gst_harness_push(harness.get(), buffer_of(bytes, 1)), GST_FLOW_OK);
+  gst_element_set_bus(harness->element, nullptr);
+}
+
+TEST(LowluxIsp, WarnsOnceOfAPropertyWithoutTheOneItRequires) {
+  const Stream stream;
+  const Bytes bytes = frame_of(stream, 1);
+  const Harness harness = harness_of(stream);
+  const Bus bus(gst_bus_new());
+  gst_element_set_bus(harness->element, bus.get());
+  int frame = 0;
+  const auto expect_warnings = [&](const std::vector<std::string>& expected) {
+    for (int i = 0; i < 2; ++i) EXPECT_EQ(gst_harness_push(harness.get(), buffer_of(bytes, frame++)), GST_FLOW_OK);
+    std::vector<std::string> found;
+    while (GstMessage* message = gst_bus_pop_filtered(bus.get(), GST_MESSAGE_WARNING)) {
+      GError* warning = nullptr;
+      gst_message_parse_warning(message, &warning, nullptr);
+      found.emplace_back(warning->message);
+      g_error_free(warning);
+      gst_message_unref(message);
+    }
+    EXPECT_EQ(found, expected);
+  };
+  expect_warnings({});
+  g_object_set(harness->element, "red-gain", 2.0, nullptr);
+  expect_warnings({"red-gain has no effect: it requires blue-gain"});
+  g_object_set(harness->element, "blue-gain", 1.5, "noise-gain", 0.5, nullptr);
+  expect_warnings({"noise-gain has no effect: it requires noise-read"});
+  g_object_set(harness->element, "red-gain", 0.0, "noise-read", 1.5, nullptr);
+  expect_warnings({"blue-gain has no effect: it requires red-gain"});
   gst_element_set_bus(harness->element, nullptr);
 }
 
