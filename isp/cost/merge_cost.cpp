@@ -64,7 +64,7 @@ class Measurement {
     unit_s_ = *unit_s;
     DevelopOptions options;
     options.denoise.mode = DenoiseChoice::Mode::automatic;
-    const FrameReader read = [&](int) { return Result<FrameToMerge>({copy_of(frame_), options, {}}); };
+    const FrameReader read = [&](int, bool) { return Result<FrameToMerge>({copy_of(frame_), options, {}}); };
     auto merged = merge_frames(frames, read, {.robust = true, .alignment = alignment}, executor_);
     if (!merged) return tl::make_unexpected(merged.error());
     merged_ = *std::move(merged);

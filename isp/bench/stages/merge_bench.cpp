@@ -222,7 +222,7 @@ class Rows {
   }
 
   Result<void> add(const MergeLevel& level, BenchTable& table) {
-    const FrameReader read = [&](int index) {
+    const FrameReader read = [&](int index, bool) {
       return Result<FrameToMerge>({copy_of(burst_.frames[static_cast<std::size_t>(index)]), merge_develop_options()});
     };
     const auto start = std::chrono::steady_clock::now();

@@ -49,8 +49,10 @@ void add_merging(CLI::App& app, MergeArgs& args) {
   add_choice<bool>(
       app, "--mean", {{"robust", true}, {"plain", false}}, [&options](bool robust) { options.robust = robust; },
       "leave out content that does not match (default; a budget may decide), or average everything");
-  app.add_option("--reference", args.reference,
-                 "raw file to which the others are aligned (default: the first; the middle one if aligned by stars)")
+  app.add_option(
+         "--reference", args.reference,
+         "raw file to which the others are aligned (default: the first; the middle one if aligned by stars; the "
+         "longest exposure of a bracket that is not saturated in more than half of its pixels)")
       ->type_name("RAW");
   add_within(app, "--false-alarm", "RATE", "fraction of a static scene that is left out by chance (default 0.001)",
              1e-6, 0.5, [&options](double rate) { options.false_alarm = rate; });

@@ -76,7 +76,7 @@ Result<MergeReport> merge_files(const RawBatch& batch, const std::vector<std::st
     cost = *std::move(now);
   }
   std::optional<NoiseOrigin> origin;
-  const auto read_input = [&](int index) -> Result<isp::FrameToMerge> {
+  const auto read_input = [&](int index, bool is_reference) -> Result<isp::FrameToMerge> {
     InlineExecutor alone;  // the other threads are at work on the previous frame
     std::vector<isp::StageTime> times;
     isp::StageClock clock(times);
@@ -84,7 +84,6 @@ Result<MergeReport> merge_files(const RawBatch& batch, const std::vector<std::st
     Result<ReadyFrame> read = read_frame(batch, {file, output.output, output.overwrite}, alone, clock);
     if (!read) return tl::make_unexpected(with_file(read.error(), file));
     if (cost) read->options.effects->cost = cost;
-    const bool is_reference = index == options.reference.value_or(0);
     if (is_reference || batch.args.noise) {
       const auto found = find_noise(read->options, batch.args.noise, read->frame, alone);
       if (!found) return tl::make_unexpected(with_file(found.error(), file));

@@ -10,12 +10,15 @@
 
 #include "isp/base/camera_profile.h"
 #include "isp/pipeline/plan/dark_charge.h"
+#include "isp/pipeline/plan/noise_facts.h"
 #include "isp/pipeline/plan/plan_develop.h"
 
 namespace lowlux::isp {
 namespace {
 
 constexpr double max_noise_ratio = 1.2;  // of the variance of frames of one ISO
+constexpr double most_saturated = 0.5;   // share of the sites of a reference
+constexpr int counted_rows = 8;          // of so many, two are counted
 
 bool differ(const std::optional<double>& a, const std::optional<double>& b) {
   if (!a || !b) return a.has_value() != b.has_value();
@@ -60,6 +63,23 @@ Result<std::optional<NoiseProfile>> noise_at_levels(const FrameToMerge& referenc
   return out;
 }
 
+/// Returns the share of saturated sites, of some rows.
+double saturated_share(const RawDn& raw) {
+  double saturated = 0, sites = 0;
+  with_samples(raw, [&](const auto& samples) {
+    const Rect& active = raw.active;
+    for (int y = 0; y < active.height; ++y) {
+      if (y % counted_rows > 1) continue;
+      const auto* const row = samples.row(active.y + y) + active.x;
+      for (int x = 0; x < active.width; ++x) {
+        saturated += static_cast<double>(row[x]) >= saturated_fraction_of_white * white_at(raw, site_of(x, y)) ? 1 : 0;
+      }
+      sites += active.width;
+    }
+  });
+  return sites > 0 ? saturated / sites : 0;
+}
+
 std::string iso_text(const std::optional<double>& iso) { return iso ? fmt::format("{:g}", *iso) : "not stated"; }
 
 /// Returns whether both frames state their noise, and differently: one of them was processed.
@@ -82,7 +102,7 @@ FrameLoader::~FrameLoader() {
 }
 
 Result<FrameElectrons> FrameLoader::read_reference(int index) {
-  Result<FrameToMerge> frame = read_(index);
+  Result<FrameToMerge> frame = read_(index, true);
   if (!frame) return tl::make_unexpected(frame.error());
   clock_.lap(waiting_stage);
   with_gain_ = true;
@@ -105,7 +125,7 @@ void FrameLoader::expect(std::vector<int> order) {
 
 void FrameLoader::begin() {
   if (position_ == order_.size()) return;
-  next_ = std::async(std::launch::async, [this, index = order_[position_]] { return read_(index); });
+  next_ = std::async(std::launch::async, [this, index = order_[position_]] { return read_(index, false); });
 }
 
 Result<FrameElectrons> FrameLoader::next() {
@@ -149,6 +169,24 @@ Result<FrameElectrons> FrameLoader::next() {
   if (!electrons) return tl::make_unexpected(at_frame(electrons.error(), last_name_));
   clock_.lap("black and noise");
   return electrons;
+}
+
+Result<int> FrameLoader::brightest(int count) {
+  if (next_.valid()) next_.wait();  // frames are read one at a time
+  int found = 0;
+  double most_light = -1;
+  for (int index = 0; index < count; ++index) {
+    Result<FrameToMerge> read = read_(index, false);
+    if (!read) return tl::make_unexpected(read.error());
+    clock_.lap(waiting_stage);
+    const RawDn& raw = read->frame.raw;
+    if (!raw.info.exposure_s) return 0;
+    const double light = *raw.info.exposure_s / std::pow(raw.info.f_number.value_or(1), 2);
+    if (light <= most_light || saturated_share(raw) > most_saturated) continue;
+    found = index;
+    most_light = light;
+  }
+  return found;
 }
 
 Result<FrameElectrons> FrameLoader::electrons_of(const FrameToMerge& read) {

@@ -42,6 +42,10 @@ class FrameLoader {
   /// Returns the next frame. Errors: those of reading and of frame_electrons; a frame that does not fit.
   Result<FrameElectrons> next();
 
+  /// Reads all frames, and returns the index of that with the most light, of those that are not saturated in more than
+  /// half of their sites; the first if none states its exposure, or all are.
+  Result<int> brightest(int count);
+
   /// Returns whether a frame that was read differed from the reference in exposure time, aperture or gain.
   bool exposures_differ() const { return exposures_differ_; }
   /// Returns the ratio of the light of the frame last read to that of the reference, by the stated exposures. Error: a

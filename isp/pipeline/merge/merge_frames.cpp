@@ -78,6 +78,17 @@ Result<void> merge_moved(MergeContext& work, std::map<int, merge::Motion> motion
   return {};
 }
 
+/// Makes the merge that of a bracket, and chooses its reference, unless it was named: where frames do not match, its
+/// noise is that of the result.
+Result<void> begin_bracket(MergeContext& work) {
+  work.out.bracket = true;
+  if (work.options.reference) return {};
+  Result<int> brightest = work.loader.brightest(work.count);
+  if (!brightest) return tl::make_unexpected(brightest.error());
+  work.out.reference = *brightest;
+  return {};
+}
+
 /// Reads the reference, chooses the method, and merges by it. Unfinished where exposures are found to differ after the
 /// choice.
 Result<void> merge_once(MergeContext& work) {
@@ -86,7 +97,11 @@ Result<void> merge_once(MergeContext& work) {
   Result<MergeChoice> choice = choose_merge(work);
   if (!choice) return tl::make_unexpected(choice.error());
   work.out.alignment = choice->method.alignment;
-  work.out.bracket |= choice->bracket;
+  if (choice->bracket && !work.out.bracket) {
+    const int first = work.out.reference;
+    if (Result<void> begun = begin_bracket(work); !begun) return begun;
+    if (work.out.reference != first) return merge_once(work);
+  }
   work.robust = choice->method.robust;
   work.out.plan = std::move(choice->plan);
   if (!choice->warning.empty()) work.out.warnings.push_back(std::move(choice->warning));
@@ -136,8 +151,8 @@ Result<MergedRaw> merge_frames(int count, const FrameReader& read, const MergeOp
   work.out.frames.resize(static_cast<std::size_t>(count));
   Result<void> done = merge_once(work);
   if (done && work.loader.exposures_differ() && !work.out.bracket) {
-    work.out.bracket = true;
-    done = merge_once(work);
+    done = begin_bracket(work);
+    if (done) done = merge_once(work);
   }
   if (!done) return tl::make_unexpected(done.error());
   warn_of_frames_left_out(work.out);

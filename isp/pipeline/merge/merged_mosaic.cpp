@@ -14,7 +14,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double min_ratio = 1e-2, max_ratio = 1e2;
+constexpr double min_ratio = 1.0 / 64, max_ratio = 982;  // that a DNG can state (noise_ratio_bytes.h)
 constexpr float hardly_different = 0.1F;
 constexpr double max_rounding = 0.1;     // of the variance
 constexpr std::size_t smooth_sites = 8;  // of the same parity, on each side

@@ -27,9 +27,10 @@ enum class MergeAlignment : std::uint8_t {
 struct MergeOptions {
   std::optional<bool> robust;               // false: plain mean of all frames; absent: robust, unless a budget decides
   std::optional<MergeAlignment> alignment;  // absent: none if the camera stood still, else subpixel
-  std::optional<int> reference;             // index of the frame that the others are brought to; absent: the first
-  double false_alarm = 1e-3;                // fraction of the blocks of a static scene that are left out, 1e-6..0.5
-  bool keep_foreground = false;             // with stars: what stands still on the ground is averaged in its place
+  /// Index of the frame that the others are brought to. Absent: the first; in a bracket FrameLoader::brightest.
+  std::optional<int> reference;
+  double false_alarm = 1e-3;     // fraction of the blocks of a static scene that are left out, 1e-6..0.5
+  bool keep_foreground = false;  // with stars: what stands still on the ground is averaged in its place
   std::optional<merge::DrizzleOptions> drizzle;  // makes a LinearRaw image; frames move, and their exposure is one
   bool developed_after = false;                  // a budget is for developing the merged frame too
   std::optional<double> memory_limit_bytes;      // of a drizzled image, which is larger than its frames
@@ -93,9 +94,9 @@ struct FrameToMerge {
   std::string name;  // of the frame in errors
 };
 
-/// Returns the frame of an index. It may be called more than once for each, always returns the same, and is called on
-/// another thread while the previous frame is processed, once at a time.
-using FrameReader = std::function<Result<FrameToMerge>(int index)>;
+/// Returns the frame of an index, for the reference or as another one. It may be called more than once for each, always
+/// returns the same, and is called on another thread while the previous frame is processed, once at a time.
+using FrameReader = std::function<Result<FrameToMerge>(int index, bool is_reference)>;
 
 /// Reports the fraction of the work that is done, 0..1.
 using MergeProgress = std::function<void(double fraction)>;

@@ -62,7 +62,7 @@ bool run(const Draw& draw, std::shared_ptr<CostModel> cost, SpeedProbe& pace, Ex
   const double least_s = predicted_merge_s(*cost, work, {MergeAlignment::none, false}, false);
   const double most_s = predicted_merge_s(*cost, work, {MergeAlignment::subpixel, true}, true);
   const double budget_s = 1.05 * least_s * std::pow(most_s / least_s, draw.place);
-  const FrameReader read = [&](int index) {
+  const FrameReader read = [&](int index, bool) {
     DevelopOptions options;
     options.denoise.mode = DenoiseChoice::Mode::automatic;
     options.effects = ProcessingGoal{.budget_s = budget_s, .cost = cost};

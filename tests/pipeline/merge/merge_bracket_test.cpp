@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -50,7 +51,7 @@ double best_variance(const std::vector<double>& lights, double signal_e, double 
 TEST(MergeBracket, EightStopsAreUnbiasedAndNearTheBestWeightsAtEveryLevel) {
   const std::vector<double> lights{1, 16, 1.0 / 16};
   const Burst burst = ramp(lights);
-  const MergedRaw merged = burst.merged(3);
+  const MergedRaw merged = burst.merged(3, {.reference = 0});
   ASSERT_TRUE(merged.bracket);
   EXPECT_EQ(merged.alignment, MergeAlignment::none);
   EXPECT_TRUE(merged.frame.raw.is_float());  // 16 bits would be coarser than the noise
@@ -73,13 +74,13 @@ TEST(MergeBracket, EightStopsAreUnbiasedAndNearTheBestWeightsAtEveryLevel) {
 TEST(MergeBracket, ThereIsNoSeamWhereAnExposureSaturatesThoughItsTimeIsWrong) {
   // Shutters of 1/16 and 16 times the time that let 8 % more and 6 % less light through than the file states.
   Burst burst = ramp({1, 16 * 0.94, 1.08 / 16});
-  const FrameReader read = [&](int index) {
+  const FrameReader read = [&](int index, bool) {
     RawFrame frame = burst.frame(index);
     frame.raw.info.exposure_s = 0.1 * std::array{1.0, 16.0, 1.0 / 16}[static_cast<std::size_t>(index)];
     return Result<FrameToMerge>({std::move(frame), burst.options()});
   };
   InlineExecutor executor;
-  const auto merged = merge_frames(3, read, {}, executor);
+  const auto merged = merge_frames(3, read, {.reference = 0}, executor);
   ASSERT_TRUE(merged) << merged.error().message;
   EXPECT_NEAR(merged->frames[1].light, 16 * 0.94, 0.1);
   EXPECT_NEAR(merged->frames[2].light, 1.08 / 16, 0.0003);
@@ -219,6 +220,29 @@ TEST(MergeBracket, IsFoundWhereverTheExposureChanges) {
   }
 }
 
+// Half of the blocks are left out by chance: what remains of them has the noise of the reference.
+TEST(MergeBracket, BlocksThatDoNotMatchHaveTheNoiseOfTheLongestExposure) {
+  Burst burst{.width = 384, .height = 256};
+  burst.light = [](int index) { return std::array{1.0, 256.0, 16.0}[static_cast<std::size_t>(index)]; };
+  burst.scene = [](double x, double y, int colour) { return test::textured(x, y, colour, 0.2); };
+  const MergedRaw merged = burst.merged(3, {.alignment = MergeAlignment::none, .false_alarm = 0.5});
+  EXPECT_EQ(merged.reference, 1);
+  const double long_variance = (0.2 * 256 + 4) / (256.0 * 256), white_e = test::night_full_e();
+  double worst = 0;
+  for (int y = 0; y + 16 <= burst.height; y += 16) {
+    for (int x = 0; x + 16 <= burst.width; x += 16) {
+      worst = std::max(worst, burst.mean_square_error(merged.frame, {x, y, 16, 16}, white_e));
+    }
+  }
+  EXPECT_LT(worst, 3 * long_variance);  // the brightest squares, and the largest of 384 means of 256 values
+  // Where most of the longest exposure is saturated, the next one is the reference; and always the one that is named.
+  burst.scene = [](double x, double, int) { return x < 200 ? 100.0 : 1.0; };
+  for (const auto alignment : {std::optional(MergeAlignment::none), std::optional<MergeAlignment>()}) {
+    EXPECT_EQ(burst.merged(3, {.alignment = alignment}).reference, 2);
+  }
+  EXPECT_EQ(burst.merged(3, {.alignment = MergeAlignment::none, .reference = 0}).reference, 0);
+}
+
 TEST(MergeBracket, WithoutAnExposureTimeItIsRefused) {
   Burst burst;
   burst.light = [](int index) { return index == 1 ? 4.0 : 1.0; };
@@ -226,7 +250,7 @@ TEST(MergeBracket, WithoutAnExposureTimeItIsRefused) {
     if (index == 1) frame.raw.info.exposure_s.reset();
   };
   InlineExecutor executor;
-  const FrameReader read = [&](int index) {
+  const FrameReader read = [&](int index, bool) {
     return Result<FrameToMerge>({burst.frame(index), burst.options(), "frame " + std::to_string(index)});
   };
   const auto merged = merge_frames(3, read, {}, executor);

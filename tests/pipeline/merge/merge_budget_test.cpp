@@ -180,7 +180,7 @@ MergedRaw merged_within(const Burst& burst, int count, double budget_s, MergeOpt
     cost->points[part] = {{1, 0.01}};
   }
   InlineExecutor executor;
-  const FrameReader read = [&](int index) {
+  const FrameReader read = [&](int index, bool) {
     DevelopOptions develop = burst.options();
     develop.effects = ProcessingGoal{.budget_s = budget_s, .cost = cost};
     return Result<FrameToMerge>({burst.frame(index), develop, {}});

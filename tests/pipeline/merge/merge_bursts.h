@@ -123,7 +123,9 @@ struct Burst {
 
   isp::MergedRaw merged(int count, const isp::MergeOptions& options_of_merge = {}, Executor* executor = nullptr) const {
     InlineExecutor one;
-    const isp::FrameReader read = [this](int index) { return Result<isp::FrameToMerge>({frame(index), options()}); };
+    const isp::FrameReader read = [this](int index, bool) {
+      return Result<isp::FrameToMerge>({frame(index), options()});
+    };
     auto result = merge_frames(count, read, options_of_merge, executor != nullptr ? *executor : one);
     EXPECT_TRUE(result) << result.error().message;
     return *std::move(result);

@@ -154,7 +154,7 @@ TEST(MergeStars, OtherStarsAreLeftOut) {
   const Sky sky(6, 200, 1500), other(60, 200, 1500);
   const Burst burst = night(sky), clouded = night(other);
   InlineExecutor one;
-  const FrameReader read = [&](int index) {
+  const FrameReader read = [&](int index, bool) {
     return Result<FrameToMerge>({(index == 3 ? clouded : burst).frame(index), burst.options()});
   };
   const auto merged = merge_frames(6, read, by_stars(), one);
@@ -171,7 +171,7 @@ TEST(MergeStars, AFrameWithoutStarsIsNoReference) {
   Burst flat = burst;
   flat.scene = [](double, double, int) { return 20.0; };
   InlineExecutor one;
-  const FrameReader read = [&](int index) {
+  const FrameReader read = [&](int index, bool) {
     return Result<FrameToMerge>({flat.frame(index), flat.options(), "a.dng"});
   };
   const auto merged = merge_frames(3, read, by_stars(), one);
@@ -309,7 +309,7 @@ TEST(MergeDrizzle, FramesThatStandStillOrDifferInExposureAreRefused) {
   Burst burst = night(sky);
   InlineExecutor one;
   const auto refused = [&](const Burst& of, const MergeOptions& options) {
-    const FrameReader read = [&](int index) { return Result<FrameToMerge>({of.frame(index), of.options()}); };
+    const FrameReader read = [&](int index, bool) { return Result<FrameToMerge>({of.frame(index), of.options()}); };
     const auto merged = merge_frames(4, read, options, one);
     return !merged && merged.error().code == ErrorCode::invalid_argument;
   };

@@ -38,7 +38,7 @@ TEST(MergeStatic, OneFrameStaysAsItIs) {
 
 TEST(MergeStatic, IdenticalFramesMatchEntirely) {
   const Burst burst;
-  const FrameReader same = [&](int) { return Result<FrameToMerge>({burst.frame(0), burst.options()}); };
+  const FrameReader same = [&](int, bool) { return Result<FrameToMerge>({burst.frame(0), burst.options()}); };
   InlineExecutor executor;
   const auto merged = merge_frames(6, same, {}, executor);
   ASSERT_TRUE(merged) << merged.error().message;
@@ -111,7 +111,7 @@ TEST(MergeStatic, RefusesFramesThatDoNotFit) {
   };
   for (const Case& c : cases) {
     for (const int bad : {1, 4}) {
-      const FrameReader read = [&](int index) {
+      const FrameReader read = [&](int index, bool) {
         RawFrame frame = burst.frame(index);
         if (index == bad) c.change(frame);
         return Result<FrameToMerge>({std::move(frame), burst.options(), "frame " + std::to_string(index)});
@@ -128,7 +128,7 @@ TEST(MergeStatic, RefusesFramesThatDoNotFit) {
 TEST(MergeStatic, AReaderThatFailsEndsTheMerge) {
   const Burst burst;
   for (const int bad : {0, 2, 4}) {
-    const FrameReader read = [&](int index) -> Result<FrameToMerge> {
+    const FrameReader read = [&](int index, bool) -> Result<FrameToMerge> {
       if (index == bad) return fail(ErrorCode::unreadable, "gone", "file " + std::to_string(index));
       return FrameToMerge{burst.frame(index), burst.options()};
     };

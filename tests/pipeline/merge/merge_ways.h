@@ -36,8 +36,8 @@ inline std::vector<MergeWay> ways_without_stars() {
       {"sub-pixel", {.alignment = MergeAlignment::subpixel}},
       {"sub-pixel, plain", {.robust = false, .alignment = MergeAlignment::subpixel}},
       {"drizzle", {.alignment = MergeAlignment::subpixel, .drizzle = drizzle}},
-      {"bracket at rest", {.alignment = MergeAlignment::none}, true},
-      {"bracket, sub-pixel", {.alignment = MergeAlignment::subpixel}, true},
+      {"bracket at rest", {.alignment = MergeAlignment::none, .reference = 0}, true},
+      {"bracket, sub-pixel", {.alignment = MergeAlignment::subpixel, .reference = 0}, true},
   };
 }
 
@@ -51,7 +51,7 @@ inline std::vector<MergeWay> moving_ways() {
 /// Merges the first `count` frames of a burst, which are named "frame 0", "frame 1", ... in errors.
 inline Result<isp::MergedRaw> tried(const Burst& burst, int count, const isp::MergeOptions& options) {
   InlineExecutor one;
-  const isp::FrameReader read = [&](int index) {
+  const isp::FrameReader read = [&](int index, bool) {
     return Result<isp::FrameToMerge>({burst.frame(index), burst.options(), "frame " + std::to_string(index)});
   };
   return merge_frames(count, read, options, one);
