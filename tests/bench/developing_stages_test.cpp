@@ -5,15 +5,18 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "isp/base/executor.h"
 #include "isp/bench/accuracy_time.h"
 #include "isp/bench/scenes/develop_scene.h"
 #include "isp/model/vision/scene_light.h"
+#include "isp/pipeline/develop.h"
 
 namespace lowlux::isp {
 namespace {
@@ -272,6 +275,29 @@ TEST(DevelopScene, TheMeanIsThatOfTheNoisyFrameWithoutItsDark) {
   EXPECT_NEAR(mean_e(raws->noisy), light.mean_e + light.dark_e + 2e-4 * 320, 5 * std::sqrt(variance_e2));
   EXPECT_EQ(raws->noisy.raw.masked.size(), 1u);
   EXPECT_TRUE(raws->noisy.noise.has_value());
+}
+
+TEST(DevelopScene, DarkChargeDoesNotBrightenTheNoisyFrame) {
+  InlineExecutor one;
+  const auto picture = read_bench_picture(LOWLUX_TESTDATA "/pictures/kodim23.png", 192, 128, one);
+  ASSERT_TRUE(picture.has_value());
+  DevelopLight light = develop_lights(false).back();  // 200 e- of dark charge of 992 e- at white
+  light.mean_e = 100;
+  const auto raws = simulated_raws(*picture, light, 1, one);
+  ASSERT_TRUE(raws.has_value());
+  const auto mean_green = [&](const RawFrame& frame, double exposure_ev) {
+    DevelopOptions options{.exposure_ev = exposure_ev, .tone = ToneCurve::none, .find_defects = false};
+    options.space = OutputSpace::camera;
+    options.samples = SampleType::f32;
+    const auto developed = develop(frame, options, one);
+    EXPECT_TRUE(developed.has_value());
+    const Plane<float>& green = std::get<SceneLinear>(developed->picture).plane[1];
+    return std::accumulate(green.data(), green.data() + green.size(), 0.0) / static_cast<double>(green.size());
+  };
+  const double expected = mean_green(raws->mean, 0);
+  const double got = mean_green(raws->noisy, noisy_exposure_ev(raws->noisy, light, 0));
+  // Hot pixels of 4160 e- are 0.8 e- of the mean. 5 standard errors: hot pixels 0.5 e-, black 0.2 e-, photons 0.1 e-
+  EXPECT_NEAR(got / expected, 1.008, 5 * 0.006);
 }
 
 TEST(DevelopScene, TheTruthHasTheColourOfEachSiteOfTheMean) {

@@ -130,6 +130,15 @@ Result<SimulatedRaws> simulated_raws(const BenchPicture& picture, const DevelopL
   return out;
 }
 
+double true_black_dn(const RawFrame& noisy, const DevelopLight& light) {
+  return noisy.raw.black_tag->pattern_dn[0] + light.dark_e * light.gain_dn_per_e;
+}
+
+double noisy_exposure_ev(const RawFrame& noisy, const DevelopLight& light, double exposure_ev) {
+  const double white_dn = noisy.raw.white_dn[0], pedestal_dn = noisy.raw.black_tag->pattern_dn[0];
+  return exposure_ev + std::log2((white_dn - true_black_dn(noisy, light)) / (white_dn - pedestal_dn));
+}
+
 RawFrame tiled(const RawFrame& frame, int width, int height) {
   const Rect& area = frame.raw.active;
   assert(area.width % 2 == 0 && area.height % 2 == 0);

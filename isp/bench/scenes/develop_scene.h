@@ -38,6 +38,13 @@ struct SimulatedRaws {
 Result<SimulatedRaws> simulated_raws(const BenchPicture& picture, const DevelopLight& light, std::uint64_t seed,
                                      Executor& executor);
 
+/// Returns the exact black level of a noisy frame, pedestal and mean dark charge [DN].
+double true_black_dn(const RawFrame& noisy, const DevelopLight& light);
+
+/// Returns the exposure [EV] that gives a noisy frame the brightness of the mean at `exposure_ev`. Exposures are
+/// relative to the range between black and white, which dark charge in the black level reduces.
+double noisy_exposure_ev(const RawFrame& noisy, const DevelopLight& light, double exposure_ev);
+
 /// Returns a frame of another size: its active area repeated, and cropped. It has no masked pixels; even sizes stay in
 /// phase.
 /// @param frame  a mosaic whose active area has even sides

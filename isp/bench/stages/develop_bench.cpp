@@ -108,6 +108,7 @@ struct Scene {
   const RawFrame& noisy;
   const RawFrame& mean;
   double exposure_ev = 0;  // automatic, of the mean frame
+  double noisy_ev = 0;     // of the noisy frame, for the same brightness
   PictureTruth truth;
 };
 
@@ -123,7 +124,8 @@ Result<std::vector<Scene>> scenes_of(const std::vector<SimulatedRaws>& raws, con
     const auto truth = develop(of.truth, options_of(untouched, look, light, ev), executor);
     if (!truth) return tl::make_unexpected(truth.error());
     const SceneLinear light_of_truth = linear_of(codes_of(*truth));
-    out.push_back({of.noisy, of.mean, ev, PictureTruth(light_of_truth.view(), executor)});
+    out.push_back(
+        {of.noisy, of.mean, ev, noisy_exposure_ev(of.noisy, light, ev), PictureTruth(light_of_truth.view(), executor)});
   }
   return out;
 }
@@ -158,6 +160,7 @@ Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, bool with_noise
   const auto frame_of = [with_noise](const Scene& scene) -> const RawFrame& {
     return with_noise ? scene.noisy : scene.mean;
   };
+  const auto exposure_of = [with_noise](const Scene& scene) { return with_noise ? scene.noisy_ev : scene.exposure_ev; };
   const RawFrame& timed = frame_of(scenes.front());
   const std::span<const PlanChoice> choices =
       with_noise ? std::span<const PlanChoice>(plan_choices) : std::span<const PlanChoice>(noise_free_choices);
@@ -165,11 +168,11 @@ Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, bool with_noise
     AccuracyLevel level{
         .name = choice.name(), .megapixels = 1e-6 * timed.raw.active.width * timed.raw.active.height, .largest = 0};
     for (const Scene& scene : scenes) {
-      const auto added = add_error(scene, frame_of(scene), options_of(choice, look, light, scene.exposure_ev),
+      const auto added = add_error(scene, frame_of(scene), options_of(choice, look, light, exposure_of(scene)),
                                    1 / static_cast<double>(scenes.size()), level, executor);
       if (!added) return tl::make_unexpected(added.error());
     }
-    level.run = [&executor_in_use, &timed, options = options_of(choice, look, light, scenes.front().exposure_ev)] {
+    level.run = [&executor_in_use, &timed, options = options_of(choice, look, light, exposure_of(scenes.front()))] {
       (void)develop(timed, options, *executor_in_use);  // the same call succeeded before
     };
     group.levels.push_back(std::move(level));
@@ -291,7 +294,7 @@ Result<BenchOutcome> run_develop_bench(const BenchOptions& options) {
   }
   out.remarks.push_back(fmt::format(
       "{} pictures{} by a simulated camera of 14 bits, masked columns stating its dark; errors against what is "
-      "developed of the true colours of every pixel, with the same exposure and look; `no noise` is the mean of the "
+      "developed of the true colours of every pixel, with the same brightness and look; `no noise` is the mean of the "
       "signal, whose error is that of demosaicing; half sizes are enlarged to be compared; megapixels are those of the "
       "mosaic; times of the first picture, planning included; "
       "by one thread in {} rounds",
