@@ -34,6 +34,8 @@ constexpr std::array registry{
                run_scene_light_bench},
     BenchStage{"retarget", "Retargeting to a dim display, exact and by tables: error against time", run_retarget_bench},
     BenchStage{"develop", "Whole plans of develop: error against time", run_develop_bench},
+    BenchStage{"error-sources", "Where the error of develop comes from: demosaicing, noise, black, rendering",
+               run_error_sources_bench},
     BenchStage{"merge", "Several raw frames merged to one: gain, noise and time of each way", run_merge_bench},
     BenchStage{"methods", "Noise reduction by other programs, on the same raw frames: leaderboards", run_methods_bench},
     BenchStage{"scaling", "Developing over frame size and threads: time and memory", run_scaling_bench},

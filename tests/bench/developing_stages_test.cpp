@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <numeric>
 #include <set>
@@ -210,6 +211,66 @@ TEST(DevelopingStages, PlansOfDevelopGainByWhatTheyDoAndAreShownInPairs) {
   EXPECT_TRUE(outcome->findings.empty());  // parts of pictures are too small to tell of times
 }
 
+TEST(DevelopingStages, NoiseIsMostOfTheErrorAtLittleLight) {
+  const auto outcome = run_error_sources_bench(quick());
+  ASSERT_TRUE(outcome.has_value()) << outcome.error().message;
+  const BenchTable& table = outcome->table;
+  ASSERT_EQ(table.rows.size(), 4u);
+  std::map<std::string, double> squared;  // of the error [codes^2]
+  for (const auto& row : table.rows) {
+    ASSERT_EQ(row.size(), table.columns.size());
+    const std::string name = std::get<std::string>(row[0]) + ", " + std::get<std::string>(row[1]);
+    const auto figure = [&](std::size_t column) { return std::get<double>(row[column]); };
+    const double demosaicing = figure(3), noise = figure(4), black = figure(5), rendering = figure(6);
+    squared[name] = figure(2);
+    EXPECT_NEAR(demosaicing + noise + black + rendering, 100, 1e-9) << name;
+    EXPECT_GT(demosaicing, 0) << name;
+    EXPECT_LT(demosaicing, 5) << name;
+    EXPECT_GT(noise, 90) << name;
+    EXPECT_LT(noise, 100) << name;
+    EXPECT_NEAR(black, 0, 3) << name
+                             << ": the measured level of a site is uncertain by 0.07 e-, and either sign is possible";
+    // Errors of rounding are uniform: their variance is 1/12.
+    EXPECT_NEAR(rendering / 100 * squared[name], 1.0 / 12, 0.01) << name;
+  }
+  EXPECT_LT(squared.at("20 e-, camera, best"), squared.at("20 e-, camera, default"));
+  EXPECT_LT(squared.at("20 e-, eye, best"), squared.at("20 e-, eye, default"));
+}
+
+TEST(ErrorSources, NoiseIsZeroWithoutNoiseAndBlackIsNotWhereItsLevelIsWrong) {
+  InlineExecutor one;
+  const auto picture = read_bench_picture(LOWLUX_TESTDATA "/pictures/kodim23.png", 192, 128, one);
+  ASSERT_TRUE(picture.has_value());
+  DevelopLight light = develop_lights(true).front();
+  light.dark_e = 0;
+  auto raws = simulated_raws(*picture, light, 1, one);
+  auto again = simulated_raws(*picture, light, 1, one);
+  ASSERT_TRUE(raws.has_value() && again.has_value());
+  raws->noisy = std::move(again->mean);
+  const DevelopOptions options{.exposure_ev = 3, .find_defects = false};
+  const auto exact = error_sources(*raws, light, options, one);
+  ASSERT_TRUE(exact.has_value()) << exact.error().message;
+  EXPECT_EQ(exact->noise, 0);
+  EXPECT_EQ(exact->black, 0);
+  EXPECT_GT(exact->demosaicing, 0);
+  EXPECT_GT(exact->rendering, 0);
+
+  RawDn& raw = raws->noisy.raw;
+  const Rect& masked = raw.masked.front();
+  // About 0.2 e- at 64 codes for each electron; constant pixels would be refused as padding.
+  for (int y = 0; y < masked.height; ++y) {
+    for (int x = 0; x < masked.width; ++x) {
+      raw.dn.at(masked.x + x, masked.y + y) += static_cast<std::uint16_t>(13 + (x + y) % 3);
+    }
+  }
+  const auto wrong = error_sources(*raws, light, options, one);
+  ASSERT_TRUE(wrong.has_value()) << wrong.error().message;
+  EXPECT_EQ(wrong->noise, 0);
+  EXPECT_GT(wrong->black, exact->sum());
+  EXPECT_EQ(wrong->demosaicing, exact->demosaicing);
+  EXPECT_EQ(wrong->rendering, exact->rendering);
+}
+
 TEST(DevelopingStages, ScalingTellsTimeAndMemoryOfEachSizeAndPlan) {
   BenchOptions options = quick();
   options.threads = 1;  // the others take as long again
@@ -242,7 +303,7 @@ TEST(DevelopingStages, WithoutPicturesEachSaysWhichIsMissing) {
   BenchOptions options = quick();
   options.pictures_folder = "/nowhere";
   for (const auto run : {run_chroma_start_bench, run_demosaic_bench, run_mesopic_bench, run_develop_bench,
-                         run_scaling_bench, run_retarget_bench}) {
+                         run_error_sources_bench, run_scaling_bench, run_retarget_bench}) {
     const auto outcome = run(options);
     ASSERT_FALSE(outcome.has_value());
     EXPECT_NE((outcome.error().where + outcome.error().message).find("/nowhere"), std::string::npos);

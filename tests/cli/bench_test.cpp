@@ -38,7 +38,7 @@ TEST(Bench, ListNamesTheStagesAndMeasuresNone) {
   EXPECT_EQ(list.exit_code, 0);
   EXPECT_TRUE(list.out.starts_with("denoise "));
   EXPECT_EQ(std::count(list.out.begin(), list.out.end(), '\n'), std::ssize(isp::bench_stages()));
-  for (const char* stage : {"chroma-start", "demosaic", "mesopic", "retarget", "develop", "scaling"}) {
+  for (const char* stage : {"chroma-start", "demosaic", "mesopic", "retarget", "develop", "error-sources", "scaling"}) {
     EXPECT_NE(list.out.find(std::string("\n") + stage + " "), std::string::npos) << stage;
   }
 }

@@ -3,8 +3,11 @@
 #include <functional>
 #include <optional>
 
+#include "isp/base/executor.h"
 #include "isp/base/result.h"
 #include "isp/bench/bench_stages.h"
+#include "isp/bench/scenes/develop_scene.h"
+#include "isp/pipeline/options.h"
 
 /// Stages of `bench` between the raw frame and the image.
 namespace lowlux::isp {
@@ -31,6 +34,27 @@ Result<BenchOutcome> run_retarget_bench(const BenchOptions& options);
 
 /// Runs the stage `develop`: complete plans, against the noise-free mean developed.
 Result<BenchOutcome> run_develop_bench(const BenchOptions& options);
+
+/// Holds the contributions to the mean squared error of the sRGB codes (0..1) of a developed frame, which add up to it.
+/// One is negative where two errors partly cancel each other.
+struct ErrorSources {
+  double demosaicing = 0;
+  double noise = 0;      // what noise reduction and repairs leave and lose
+  double black = 0;      // error of the measured black level
+  double rendering = 0;  // rounding to 8 bits
+
+  double sum() const { return demosaicing + noise + black + rendering; }
+};
+
+/// Develops a noisy frame as it is, with the true black level, without noise, and from the true colours of every pixel.
+/// A contribution is the difference between the errors of two of these images in succession (isp/bench/README.md).
+/// @param options  sRGB of 8 bits; exposure_ev, which has to be set, is that of the mean frame
+/// Errors: those of develop.
+Result<ErrorSources> error_sources(const SimulatedRaws& raws, const DevelopLight& light, const DevelopOptions& options,
+                                   Executor& executor);
+
+/// Runs the stage `error-sources`: contributions of demosaicing, noise, black and rendering to the error of `develop`.
+Result<BenchOutcome> run_error_sources_bench(const BenchOptions& options);
 
 /// Runs the stage `merge`: ways to merge bursts to one raw frame, against the truth of their first frame.
 Result<BenchOutcome> run_merge_bench(const BenchOptions& options);

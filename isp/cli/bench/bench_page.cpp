@@ -14,7 +14,7 @@
 namespace lowlux::cli {
 namespace {
 
-constexpr std::array<std::string_view, 2> whole_pipeline{"develop", "simulate"};  // ids of stages
+constexpr std::array<std::string_view, 3> whole_pipeline{"develop", "error-sources", "simulate"};  // ids of stages
 
 std::vector<const MeasuredStage*> in_order_of_page(const std::vector<MeasuredStage>& measured) {
   std::vector<const MeasuredStage*> out;
