@@ -56,7 +56,7 @@ struct DenoiseOptions {
   Level level = Level::standard;
   std::array<double, 3> white_gain{1, 1, 1};  // R, G, B; 1e-3..1e3. Undone at the end; neutral detail must be equal
   /// Prior standard deviation of chroma relative to luma, both of stabilised values: chroma C becomes C L^2 rho^2 /
-  /// (L^2 rho^2 + its variance). > 0; infinity leaves chroma as it is.
+  /// (L^2 rho^2 + its variance). > 0; infinity leaves chroma as the transforms estimate it.
   double rho = 1.5;
   /// Finest pyramid level on which chroma is estimated, 0..2; if absent, it follows from the signal to noise ratio of
   /// each tile of 64 x 64 cells, blended. With Level::best only 0 or 2.
@@ -65,6 +65,10 @@ struct DenoiseOptions {
   /// difference between them (spatial/site_slopes.h).
   bool sites_coincide = false;
   bool keep_point_sources = true;  // stars pass unfiltered: see point_sources.h
+  /// The means of R, G and B over squares of 16 x 16 cells are those of the raw values: what the result lacks is added
+  /// again (spatial/area_means.h). It costs the noise of such means. Without it, colours below their noise are moved
+  /// towards those of their surroundings, also for an infinite rho.
+  bool keep_means = false;
   /// Ratio of the noise variance to that of RawNoise on each pyramid level, finest first; 0.01..100. It differs from 1
   /// where noise is not white, as in raws that were already denoised or compressed with loss: see noise_check.h. The
   /// search for point sources uses RawNoise alone.
@@ -82,7 +86,8 @@ struct DenoiseMaps {
   /// such a value (spatial/stabiliser.h) it is
   ///     b^2 (r_L + 0.36 f1^2 r_C1 + f2^2 r_C2 / 2) / gain^2 for R and B,
   ///     b^2 (r_L + 0.16 f1^2 r_C1 + f3^2 r_C3 / 4) / gain^2 for G.
-  /// It includes neither the colour that rho removes nor the unreduced noise of point sources.
+  /// It includes neither the colour that rho removes nor the unreduced noise of point sources. With
+  /// DenoiseOptions::keep_means, this and residual_variance include the variance of the means.
   std::array<PlaneView<float>, 3> site_variance;
 };
 

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <span>
 
+#include "denoise/spatial/area_means.h"
 #include "denoise/spatial/bands.h"
 #include "denoise/spatial/chroma_start.h"
 #include "denoise/spatial/frame_memory.h"
@@ -75,6 +76,7 @@ struct Run {
   std::span<const float> removed(const PlaneSet& planes) const;
   void keep_partly_saturated(int y, const UnpackMemory& m) const;
   void unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const;
+  void restore_means(PlaneView<float> signal_e, const DenoiseMaps& maps) const;
 };
 
 void Run::find_sources() {
@@ -316,6 +318,18 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
   });
 }
 
+void Run::restore_means(PlaneView<float> signal_e, const DenoiseMaps& maps) const {
+  denoise::restore_means({.raw = raw,
+                          .noise = noise,
+                          .variance_scale = options.variance_scale[max_levels - 1],
+                          .white_gain = options.white_gain,
+                          .dark_e = dark_e,
+                          .min_e = {min_e(0), min_e(1), min_e(2)},
+                          .sources = sources,
+                          .saturated = memory.saturated.view()},
+                         memory, workers, signal_e, maps);
+}
+
 [[maybe_unused]] bool usable(const RawNoise& noise, const DenoiseOptions& options) {
   const auto within = [](double x, double least, double most) { return x >= least && x <= most; };
   bool good = options.rho > 0;
@@ -375,6 +389,7 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   }
   add_residuals(frame);
   run.unpack(state_->memory.level[0].value[last], signal_e, maps);
+  if (options.keep_means) run.restore_means(signal_e, maps);
 }
 
 std::string_view name_of(Level level) {

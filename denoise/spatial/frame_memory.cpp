@@ -13,6 +13,8 @@ namespace {
 constexpr std::size_t line_floats = 16;  // one cache line
 constexpr std::size_t lead = 16;         // floats that may be read before a row
 
+constexpr std::size_t means_of_square = 6;  // of R, G, B, and their variances
+
 /// Returns the floats of a row, an odd number of cache lines: at a power of two, the rows that are read together would
 /// share cache sets.
 std::size_t row_size(int cells) {
@@ -102,6 +104,12 @@ void lay_out(Rows& from, int width, UnpackMemory& out) {
   });
 }
 
+void lay_out(Rows& from, int width, MeansMemory& out) {
+  out.scratch = from.scratch([&] {
+    for (float*& r : out.row) r = from.take(row_size(width), 1);
+  });
+}
+
 void lay_out(Rows& from, int width, SearchMemory& out) {
   out.scratch = from.scratch([&] {
     for (float*& r : out.pair) r = from.take(row_size(2 * width), 1);
@@ -131,13 +139,15 @@ struct Extent {
   int levels;
   int width;
   int height;
-  std::size_t starts;  // tiles of ChromaStarts
+  std::size_t starts;   // tiles of ChromaStarts
+  std::size_t squares;  // over which means are kept
 };
 
 Extent extent_of(const FrameLayout& of) {
   const int levels = levels_of(of.columns, of.rows);
   return {levels, padded(of.columns, levels), padded(of.rows, levels),
-          static_cast<std::size_t>(tiles_of(of.columns)) * static_cast<std::size_t>(tiles_of(of.rows))};
+          static_cast<std::size_t>(tiles_of(of.columns)) * static_cast<std::size_t>(tiles_of(of.rows)),
+          static_cast<std::size_t>(squares_of(of.columns)) * static_cast<std::size_t>(squares_of(of.rows))};
 }
 
 }  // namespace
@@ -168,6 +178,7 @@ std::size_t FrameLayout::lay_out(float* memory) {
     denoise::lay_out(from, extent.width, own.blocks);
     denoise::lay_out(from, extent.width, own.up);
     denoise::lay_out(from, extent.width, own.unpack);
+    denoise::lay_out(from, extent.width, own.means);
   }
   for (SearchMemory& own : search) denoise::lay_out(from, extent.width, own);
   for (PatchMemory& own : patches) denoise::lay_out(from, extent.width, own);
@@ -184,7 +195,7 @@ std::size_t FrameMemory::bytes(int max_width, int max_height, int threads, bool 
          sizeof(std::int32_t) * workers * static_cast<std::size_t>(max_width) +
          layout.patches.size() * (sizeof(PatchMemory) + static_cast<std::size_t>(extent.width)) +
          workers * (sizeof(ThreadMemory) + sizeof(SearchMemory)) + extent.starts * (2 * sizeof(float) + max_levels) +
-         sizeof(FrameMemory);
+         means_of_square * sizeof(float) * extent.squares + sizeof(FrameMemory);
 }
 
 FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
@@ -206,6 +217,7 @@ FrameMemory::FrameMemory(int max_width, int max_height, int threads, bool best)
   starts.resize(extent.starts);
   removed.resize(extent.starts);
   has_chroma.resize(extent.starts * max_levels);
+  means.resize(means_of_square * extent.squares);
 }
 
 }  // namespace lowlux::denoise

@@ -76,11 +76,18 @@ struct UnpackMemory {
   float* confidence = nullptr;
 };
 
+/// Rows of one thread while it restores the means of areas.
+struct MeansMemory {
+  Scratch scratch;
+  std::array<float*, 3> row{};  // R, G, B
+};
+
 struct ThreadMemory {
   FrontMemory front;
   BlockMemory blocks;
   UpMemory up;
   UnpackMemory unpack;
+  MeansMemory means;
 };
 
 /// Patch sums of one thread, for Level::best only.
@@ -129,6 +136,7 @@ struct FrameMemory : FrameLayout {
   std::vector<float> starts;              // chroma start level of each tile
   std::vector<float> removed;             // see removed_noise(), of each tile
   std::vector<unsigned char> has_chroma;  // for each level, each tile
+  std::vector<float> means;               // see restore_means(): of R, G, B in each square, then their variances
 
  private:
   struct Free {

@@ -48,6 +48,12 @@ constexpr int raw_of(int cell, int site, int size) {
 constexpr int tiles_of(int cells) { return std::max(1, cells / tile); }
 constexpr int tile_of(int cell, int tiles) { return std::min(cell / tile, tiles - 1); }
 
+/// Squares of cells over which means are kept: 16 cells each way, so that cells of level 0 lie in them as those of
+/// level `mean_grid` lie in tiles. The last square is the largest.
+inline constexpr int mean_grid = 2;
+inline constexpr int mean_square = tile >> mean_grid;
+constexpr int squares_of(int cells) { return std::max(1, cells / mean_square); }
+
 /// Returns the sites of R, G in the row of red, G in the row of blue, and B.
 constexpr PerSite<int> sites_of(BayerPhase phase) {
   const int red = site_of(red_column(phase), red_row(phase));

@@ -27,7 +27,9 @@ struct DenoiseChoice {
   bool line_noise = true;                           // also row and column noise where it is significant
   bool maps = false;                                // keep NoiseMaps
   bool always = false;                              // for Mode::automatic: draft at least
-  bool unbiased_chroma = false;  // no prior on colour (DenoiseOptions::rho): areas keep their mean, errors are larger
+  /// No prior on colour (DenoiseOptions::rho), and areas keep their mean (DenoiseOptions::keep_means); errors are
+  /// larger.
+  bool unbiased_chroma = false;
 };
 
 /// Describes noise reduction in which previous frames of the stream take part: see denoise::TemporalMean.

@@ -60,7 +60,7 @@ TEST(DenoiserInputs, OfAnyFiniteNumbersGiveFiniteNumbers) {
     Camera camera{.phase = BayerPhase::rggb, .read_noise_e = i % 4 == 0 ? 0.0 : 3.0, .white_gain = {gain, 1, 0.001}};
     const auto raw = any_frame(i, width, height);
     for (const Level level : denoise::all_levels) {
-      DenoiseOptions options{.level = level, .rho = i % 3 == 0 ? no_prior : 1.5};
+      DenoiseOptions options{.level = level, .rho = i % 3 == 0 ? no_prior : 1.5, .keep_means = i % 3 != 1};
       options.variance_scale = {scale, 1, 1, 1, 1 / scale};
       const Denoised out(raw, camera, options);
       ASSERT_TRUE(is_finite(out.signal)) << i;

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <random>
 #include <string>
+#include <utility>
 
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/plan/plan_develop.h"
@@ -117,9 +118,16 @@ TEST(NoiseReduction, DarkChargeThatTheBlackPointKnowsIsTakenOffWithItsNoise) {
 // DenoiserColour has what the prior does to colours.
 TEST(NoiseReduction, ColourHasAPriorUnlessNoBiasIsAskedFor) {
   const RawFrame frame = test::night_frame({}, grey(5), 64, 64);
-  EXPECT_EQ(planned(frame, {.mode = Mode::automatic}).noise_reduction.options.rho, denoise::DenoiseOptions{}.rho);
-  const auto unbiased = planned(frame, {.mode = Mode::automatic, .unbiased_chroma = true}).noise_reduction;
-  EXPECT_TRUE(std::isinf(unbiased.options.rho));
+  const auto least_error = planned(frame, {.mode = Mode::automatic}).noise_reduction;
+  EXPECT_EQ(least_error.options.rho, denoise::DenoiseOptions{}.rho);
+  EXPECT_FALSE(least_error.options.keep_means);
+  RawFrame grey_frame = test::night_frame({}, grey(5), 64, 64);
+  grey_frame.raw.layout = SensorLayout::monochrome;
+  for (const RawFrame* of : {&frame, &std::as_const(grey_frame)}) {
+    const auto unbiased = planned(*of, {.mode = Mode::automatic, .unbiased_chroma = true}).noise_reduction;
+    EXPECT_TRUE(std::isinf(unbiased.options.rho));
+    EXPECT_TRUE(unbiased.options.keep_means);
+  }
 }
 
 TEST(NoiseReduction, UnknownNoiseIsLeftOrAnErrorIfALevelWasAskedFor) {

@@ -228,6 +228,18 @@ TEST(Tiles, WithNoiseReductionTheDifferenceIsFarBelowTheNoise) {
   }
 }
 
+// What is added to keep means depends on squares of 32 px all around, 0.17 times as much for each one farther away.
+TEST(Tiles, MeansOfAreasAreKeptAsInTheWholeFrame) {
+  RawFrame frame = test::night_frame({.phase = BayerPhase::grbg}, night_scene(20), 1003, 741);
+  frame.raw.default_crop = {5, 3, 990, 730};
+  const DevelopPlan plan =
+      planned(frame, options_for({.mode = Mode::level, .level = Level::standard, .unbiased_chroma = true}));
+  ASSERT_TRUE(plan.noise_reduction.options.keep_means);
+  const Difference found = difference(rendered(frame, plan, small_tiles), rendered(frame, plan, never), plan);
+  EXPECT_LT(found.rms, max_rms);
+  EXPECT_LT(found.most, max_anywhere);
+}
+
 TEST(Tiles, StarsAtASeamAreFoundAsInTheWholeFrame) {
   constexpr int star_x = 254, star_y = 255;  // a green site; the seams are at 256
   const auto scene = [](int x, int y) {

@@ -13,7 +13,8 @@ struct Denoised {
   std::array<Plane<double>, 3> site_variance;
 };
 
-/// Computes what denoise::Denoiser does, in double and one block at a time, without its treatment of point sources.
+/// Computes what denoise::Denoiser does, in double and one block at a time, without its treatment of point sources
+/// and without DenoiseOptions::keep_means.
 Denoised denoise(const denoise::RawElectronsView& raw, const denoise::RawNoise& noise,
                  const denoise::DenoiseOptions& options);
 

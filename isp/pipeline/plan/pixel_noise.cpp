@@ -126,7 +126,10 @@ Result<NoiseReduction> plan_pixel_noise(const RawFrame& frame, const Thumbnail& 
   choose_level(request, out);
   if (!out.level) return out;
   out.options.level = *out.level;
-  if (request.choice.unbiased_chroma) out.options.rho = std::numeric_limits<double>::infinity();
+  if (request.choice.unbiased_chroma) {
+    out.options.rho = std::numeric_limits<double>::infinity();
+    out.options.keep_means = true;
+  }
   const denoise::NoiseCheck check = check_pixels(frame, levels, checked, executor);
   out.options.variance_scale = denoise::variance_scale_of(check);
   NoiseProfile model = *frame.noise;

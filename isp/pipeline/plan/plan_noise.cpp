@@ -214,7 +214,10 @@ Result<NoiseReduction> plan_noise(const RawFrame& frame, const Thumbnail& thumbn
   choose_level(request, out);
   if (!out.level) return out;
   out.options.level = *out.level;
-  if (choice.unbiased_chroma) out.options.rho = std::numeric_limits<double>::infinity();
+  if (choice.unbiased_chroma) {
+    out.options.rho = std::numeric_limits<double>::infinity();
+    out.options.keep_means = true;
+  }
   RawElectrons whole;
   const bool with_lines = choice.line_noise && request.lines;
   const denoise::NoiseCheck check = check_frame(frame, levels, with_lines, out, whole, executor);
