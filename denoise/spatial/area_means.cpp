@@ -5,6 +5,7 @@
 #include <span>
 
 #include "denoise/spatial/chroma_start.h"
+#include "isp/base/frame.h"
 
 namespace lowlux::denoise {
 namespace {
@@ -14,10 +15,15 @@ namespace {
 /// over w is (2 a - b) / (3 (a^2 - b^2)^1.5) = 1.179 for a = 3/4, b = 1/4.
 constexpr double interpolated_variance = 1.39;
 
+constexpr double most_variance = 8;  // of a site that counts, over the harmonic mean of its square
+constexpr double most_sigma = 5;     // of a difference that is noise
+
 /// Sums over the sites of one colour in a square.
 struct SiteSums {
+  double inverse_variance = 0;
+  int seen = 0;  // of those, whether they count or not
   double missing_e = 0;
-  double raw_e = 0;
+  double variance_e2 = 0;
   int counted = 0;
   int all = 0;
 };
@@ -72,20 +78,26 @@ struct Restoring {
   std::size_t colour(int x, int y) const { return static_cast<std::size_t>(colour_at(frame.raw.phase, x, y)); }
   int end(int i, int count, int cells) const { return i + 1 == count ? cells : (i + 1) * mean_square; }
 
-  /// Adds the sites of a raw row in columns left..right - 1, both even or the end of the row, to the sums.
-  void add_sites(int y, int left, int right, std::array<SiteSums, 3>& sums) const {
-    const float *const raw = frame.raw.value.row(y), *const signal = signal_e.row(y);
-    const std::uint8_t* const saturated = frame.saturated.row(y / 2);
-    const std::uint8_t* const source = frame.sources.data == nullptr ? nullptr : frame.sources.row(y / 2);
-    for (int x = left; x < right; ++x) {
-      const std::size_t k = colour(x, y);
-      SiteSums& sum = sums[k];
-      ++sum.all;
-      if (std::isnan(raw[x]) || saturated[x / 2] != 0 || (source != nullptr && source[x / 2] != 0)) continue;
-      const double value = std::clamp(static_cast<double>(raw[x]), -largest_e, largest_e);
-      sum.missing_e += value - frame.dark_e[k] - static_cast<double>(signal[x]);
-      sum.raw_e += value;
-      ++sum.counted;
+  /// Calls use(k, missing_e, variance_e2) for the sites of a square of cells that are not saturated and no point
+  /// source, and skip(k) for the others: the colour, what the result lacks, and the variance of the larger of both
+  /// values.
+  template <class Use, class Skip>
+  void for_sites(const Rect& square, const Use& use, const Skip& skip) const {
+    for (int y = square.y; y < square.y + square.height; ++y) {
+      const float *const raw = frame.raw.value.row(y), *const signal = signal_e.row(y);
+      const std::uint8_t* const saturated = frame.saturated.row(y / 2);
+      const std::uint8_t* const source = frame.sources.data == nullptr ? nullptr : frame.sources.row(y / 2);
+      for (int x = square.x; x < square.x + square.width; ++x) {
+        const std::size_t k = colour(x, y);
+        if (std::isnan(raw[x]) || saturated[x / 2] != 0 || (source != nullptr && source[x / 2] != 0)) {
+          skip(k);
+          continue;
+        }
+        const double value = std::clamp(static_cast<double>(raw[x]), -largest_e, largest_e);
+        const double result = frame.dark_e[k] + static_cast<double>(signal[x]);
+        const double larger = std::max({value, result, static_cast<double>(frame.min_e[k])});
+        use(k, value - result, larger + frame.noise.variance_e2[k]);
+      }
     }
   }
 
@@ -94,19 +106,34 @@ struct Restoring {
     const int left = 2 * mean_square * square_x, top = 2 * mean_square * square_y;
     const int right = std::min(2 * end(square_x, across, columns), signal_e.width);
     const int bottom = std::min(2 * end(square_y, down, rows), signal_e.height);
+    const Rect square{left, top, right - left, bottom - top};
+    const double ratio =
+        frame.variance_scale * frame.raw.noise_ratio.mean(square.x, square.y, square.width, square.height);
     std::array<SiteSums, 3> sums{};
-    for (int y = top; y < bottom; ++y) add_sites(y, left, right, sums);
-    const double ratio = frame.raw.noise_ratio.mean(left, top, right - left, bottom - top);
+    for_sites(
+        square,
+        [&](std::size_t k, double, double variance_e2) {
+          sums[k].inverse_variance += 1 / variance_e2;
+          ++sums[k].seen;
+          ++sums[k].all;
+        },
+        [&](std::size_t k) { ++sums[k].all; });
+    for_sites(
+        square,
+        [&](std::size_t k, double missing_e, double variance_e2) {
+          SiteSums& sum = sums[k];
+          const bool is_lamp = variance_e2 * sum.inverse_variance > most_variance * sum.seen;
+          if (is_lamp || missing_e * missing_e > most_sigma * most_sigma * ratio * variance_e2) return;
+          sum.missing_e += missing_e;
+          sum.variance_e2 += variance_e2;
+          ++sum.counted;
+        },
+        [](std::size_t) {});
     const std::size_t i = static_cast<std::size_t>(square_y) * static_cast<std::size_t>(across) + square_x;
     for (std::size_t k = 0; k < 3; ++k) {
-      const SiteSums& sum = sums[k];
-      const double sites = std::max(static_cast<double>(sum.counted), 0.25 * sum.all);
-      mean(k)[i] = static_cast<float>(sum.missing_e / sites);
-      const double raw_e = sum.counted == 0 ? 0 : sum.raw_e / sum.counted;
-      const double of_site =
-          ratio * (std::max(raw_e, static_cast<double>(frame.min_e[k])) + frame.noise.variance_e2[k]);
-      variance(k)[i] =
-          static_cast<float>(interpolated_variance * frame.variance_scale * of_site * sum.counted / (sites * sites));
+      const double sites = std::max({static_cast<double>(sums[k].counted), 0.25 * sums[k].all, 1.0});
+      mean(k)[i] = static_cast<float>(sums[k].missing_e / sites);
+      variance(k)[i] = static_cast<float>(interpolated_variance * ratio * sums[k].variance_e2 / (sites * sites));
     }
   }
 

@@ -30,8 +30,10 @@ struct MeansFrame {
 /// Adds to the result what it lacks in the mean of each square of 16 x 16 cells (see layout.h), for R, G and B
 /// separately, and to the variances in `maps` those of the means. Values between the centres of squares are bilinear,
 /// from nodes such that the mean over each square is that of the raw values, where all of its sites count. NaN,
-/// saturated cells and point sources do not count. Saturated cells stay as they are. Where less than a quarter of the
-/// sites of a square count, as much is added as if the others of that quarter lacked nothing.
+/// saturated cells and point sources do not count, nor do lamps and what they spoil, whose errors would spread over
+/// dark surroundings: sites of more than eight times the variance of the others (harmonic mean), and those that differ
+/// from their raw value by more than five standard deviations. Saturated cells stay as they are. Where less than a
+/// quarter of the sites of a square count, as much is added as if the others of that quarter lacked nothing.
 /// @param signal_e  the result, dark subtracted
 void restore_means(const MeansFrame& frame, FrameMemory& memory, const Workers& workers, PlaneView<float> signal_e,
                    const DenoiseMaps& maps);

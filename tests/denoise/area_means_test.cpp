@@ -90,6 +90,28 @@ TEST(AreaMeans, PatchesOfFaintColoursKeepTheirColour) {
   }
 }
 
+// Errors next to a lamp are large in units of its surroundings.
+TEST(AreaMeans, LampsDoNotChangeTheirSurroundings) {
+  const Camera camera = camera_over(5);
+  const Scene scene = [](int x, int y) {
+    const double e = x >= 150 && x < 157 && y >= 130 && y < 135 ? 1e6 : 2;
+    return std::array{e, e, e};
+  };
+  const auto raw = exposed(camera, scene, 320, 256, 87);
+  const DenoiseOptions shrunk{.rho = no_prior};
+  DenoiseOptions kept = shrunk;
+  kept.keep_means = true;
+  const Denoised without(raw, camera, shrunk), with(raw, camera, kept);
+  // Standard error of R and B; values at the centres of squares have at most 2.2 times that.
+  const double of_square = std::sqrt((2 + 5 + 16) / (square_px * square_px / 4.0));
+  for (int y = 0; y < 256; ++y) {
+    for (int x = 0; x < 320; ++x) {
+      if (x >= 134 && x < 173 && y >= 114 && y < 151) continue;
+      ASSERT_NEAR(with.signal.at(x, y), without.signal.at(x, y), 5 * 2.2 * of_square) << x << ", " << y;
+    }
+  }
+}
+
 // Patches that do not lie on squares: away from their edges.
 TEST(AreaMeans, TheMiddleOfAnyAreaKeepsItsColour) {
   const Camera camera = camera_over(230);

@@ -71,8 +71,9 @@ TEST(HardCaseMerge, BracketOf24Ev) {
     Burst burst{.width = 1024, .height = 64};
     burst.scene = [](double x, double, int) { return 0.01 * std::pow(10, 9.18 * x / 1023); };
     burst.light = [&](int index) { return lights[static_cast<std::size_t>(index)]; };
-    const auto merged = in_mode(
-        m, [&] { return burst.merged(static_cast<int>(lights.size()), {.alignment = isp::MergeAlignment::none}); });
+    const auto merged = in_mode(m, [&] {
+      return burst.merged(static_cast<int>(lights.size()), {.alignment = isp::MergeAlignment::none, .reference = 0});
+    });
     EXPECT_TRUE(merged.frame.raw.is_float());
     const double white_e = std::exp2(merged.baseline_exposure_ev) / lights[0] * test::night_full_e();
     double worst = 0;
