@@ -62,7 +62,7 @@ Result<std::optional<Matrix3>> read_forward(const DngFile& dng, const TiffDirect
   return bad(name, "maps a neutral to an impossible colour");
 }
 
-/// Reads three positive numbers of similar size; nullopt if there is no such tag.
+/// Reads three positive numbers of similar size; nullopt if the tag is missing.
 Result<std::optional<Vector3>> read_positive(const DngFile& dng, const TiffDirectory& raw_image, TagName name) {
   auto values = numbers_of(dng, raw_image, name, 3);
   if (!values) return pass_on(values);

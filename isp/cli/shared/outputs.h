@@ -50,7 +50,7 @@ Result<PictureKind> picture_kind(isp::FileFormat format, std::optional<int> bits
 Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, isp::FileFormat format);
 
 /// Returns whether options cannot be combined, see isp::check_options. A depth or a space that the format of the output
-/// does not support is no such contradiction.
+/// does not support does not count.
 bool options_contradict(const DevelopArgs& args);
 
 /// Checks before any work that a file can be written; the writers check again.
