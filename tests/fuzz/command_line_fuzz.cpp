@@ -19,6 +19,7 @@
 #include "isp/cli/finished/resaturate_args.h"
 #include "isp/cli/finished/retarget_args.h"
 #include "isp/cli/shared/exit_code.h"
+#include "isp/cli/shared/outputs.h"
 #include "isp/cli/simulate/simulate_args.h"
 #include "tests/fuzz/input.h"
 
@@ -39,6 +40,8 @@ void parsed(const Words& words) {
   test::require(code == nullptr || *code == exit_usage || (*code == exit_done && asks_for_help(words)));
 }
 
+Parsed<DevelopArgs> parsed_develop(const Words& words) { return parse_develop(words, options_contradict); }
+
 struct Verb {
   std::string_view name;
   void (*parsed)(const Words& words);
@@ -57,7 +60,7 @@ constexpr std::array verbs{
     Verb{"compare", parsed<parse_compare>},
     Verb{"dataset", parsed<parse_dataset>},
     Verb{"denoise", parsed<parse_denoise>},
-    Verb{"develop", parsed<parse_develop>},
+    Verb{"develop", parsed<parsed_develop>},
     Verb{"info", parsed<parse_info>},
     Verb{"merge", parsed<parse_merge>},
     Verb{"reproduce", parsed<parse_reproduce>},
