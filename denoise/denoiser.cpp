@@ -75,6 +75,7 @@ struct Run {
   void front() const;
   std::span<const float> removed(const PlaneSet& planes) const;
   void keep_partly_saturated(int y, const UnpackMemory& m) const;
+  void undo_excessive_changes(int y, float* ratio, float* signal) const;
   void unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const;
   void restore_means(PlaneView<float> signal_e, const DenoiseMaps& maps) const;
 };
@@ -259,6 +260,28 @@ void Run::keep_partly_saturated(int y, const UnpackMemory& m) const {
   }
 }
 
+/// Takes back what changed values of row y by much more than their noise: see rows::ChangedRow. Lamps of a merged raw
+/// can be 1e5 times as bright as the sites next to them and have 1000 times the noise ratio; errors below their noise
+/// are not below that of these sites. Cells that hold saturated sites stay as they are.
+void Run::undo_excessive_changes(int y, float* ratio, float* signal) const {
+  const int width = raw.value.width;
+  raw.noise_ratio.row(0, 1, y, {ratio, static_cast<std::size_t>(width)});
+  const std::uint8_t *const first = memory.saturated.row(y / 2), *const last = first + columns;
+  for (const std::uint8_t* at = std::find(first, last, 1); at != last; at = std::find(at + 1, last, 1)) {
+    const auto x = 2 * (at - first);
+    ratio[x] = ratio[x + 1] = std::numeric_limits<float>::infinity();
+  }
+  rows::ChangedRow in{.raw_e = raw.value.row(y), .ratio = ratio, .width = width};
+  in.variance_scale = static_cast<float>(options.variance_scale[0]);
+  for (int odd = 0; odd < 2; ++odd) {
+    const auto k = static_cast<std::size_t>(colour_at(raw.phase, odd, y));
+    in.dark_e[odd] = static_cast<float>(dark_e[k]);
+    in.min_e[odd] = min_e(static_cast<int>(k));
+    in.variance_e2[odd] = static_cast<float>(noise.variance_e2[k]);
+  }
+  rows::undo_excessive_row(in, signal);
+}
+
 /// Converts the planes of level 0 back to a mosaic.
 void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const DenoiseMaps& maps) const {
   const PyramidLevel& level = memory.level[0];
@@ -306,6 +329,7 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
         const int raw_y = 2 * y + (i == 0 ? red_row(raw.phase) : 1 - red_row(raw.phase));
         if (raw_y >= signal_e.height) continue;
         for_each_source_site(raw_y, [&](int x, float excess) { m.signal[i][x] += excess; });
+        if (!raw.noise_ratio.is_one()) undo_excessive_changes(raw_y, m.ratio, m.signal[i]);
         std::memcpy(signal_e.row(raw_y), m.signal[i], signal_e.width * sizeof(float));
       }
       const auto put = [&](PlaneView<float> map, const float* from) {

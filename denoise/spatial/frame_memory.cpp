@@ -99,7 +99,7 @@ void lay_out(Rows& from, int width, UnpackMemory& out) {
   out.scratch = from.scratch([&] {
     out.up = from.kernel(rows::up_scratch(width / 2));
     for (float*& r : out.residual) r = from.take(row_size(width), 1);
-    for (float*& r : out.signal) r = from.take(row_size(2 * width), 1);
+    for (float** r : {&out.signal[0], &out.signal[1], &out.ratio}) *r = from.take(row_size(2 * width), 1);
     for (float** r : {&out.removed, &out.seen, &out.confidence}) *r = from.take(row_size(width), 1);
   });
 }

@@ -73,6 +73,7 @@ struct UnpackMemory {
   float* removed = nullptr;
   float* seen = nullptr;
   std::array<float*, 2> signal{};  // raw samples
+  float* ratio = nullptr;          // of raw samples
   float* confidence = nullptr;
 };
 

@@ -166,6 +166,22 @@ struct UnpackedRow {
 };
 void unpack_row(const UnpackRow& in, const UnpackedRow& out);
 
+/// Input for the limit of changes in a raw row; arrays have the values of even and of odd sites.
+struct ChangedRow {
+  const float* raw_e;  // with dark charge; values that are not numbers set no limit
+  const float* ratio;  // noise ratio of each site; infinity: no limit
+  int width;
+  float dark_e[2];
+  float min_e[2];  // floor of the raw mean
+  float variance_e2[2];
+  float variance_scale;
+};
+/// Takes back changes of raw values by more than five standard deviations, sigma^2 = ratio (mean + variance) with the
+/// larger of raw value and result for the mean, because small counts are skewed: half of a change by 6.7 sigma, and all
+/// of those by 10 or more.
+/// @param signal_e  the result without dark charge, changed in place; this row and `ratio` are padded, raw_e is not
+void undo_excessive_row(const ChangedRow& in, float* signal_e);
+
 /// Input for the noise removed from a row of cells, the first of them even; variances have half width.
 struct RemovedRow {
   const float* noisy[4];  // L, C1, C2, C3

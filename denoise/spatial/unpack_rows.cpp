@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstddef>
 #include <initializer_list>
 
@@ -118,6 +119,30 @@ void UnpackCells(const UnpackRow& in, const UnpackedRow& out) {
   }
 }
 
+void UndoExcessive(const ChangedRow& in, float* signal_e) {
+  const Floats f;
+  const int n = lanes();
+  const auto both = [f](const float(&of)[2]) HWY_ATTR { return hn::OddEven(hn::Set(f, of[1]), hn::Set(f, of[0])); };
+  const VF dark = both(in.dark_e), least = both(in.min_e), steady = both(in.variance_e2);
+  const VF scale = constant(25 * in.variance_scale), most = constant(1e9f);
+  const auto undo = [&](const float* raw_e, int x) HWY_ATTR {
+    const VF raw = load(raw_e), signal = load(signal_e + x), result = hn::Add(signal, dark);
+    const VF value = hn::Min(hn::Max(raw, hn::Neg(most)), most), change = hn::Sub(result, value);
+    const VF mean = hn::Max(hn::Max(value, result), least), square = hn::Mul(change, change);
+    const VF limit = hn::Mul(hn::Mul(scale, load(in.ratio + x)), hn::Add(mean, steady));
+    const auto exceeds = hn::And(hn::Gt(square, limit), hn::Eq(raw, raw));
+    const VF rest = hn::MulAdd(constant(2), hn::Sqrt(hn::Div(limit, square)), constant(-1));
+    const VF limited = hn::MulAdd(hn::Max(rest, hn::Zero(f)), change, hn::Sub(value, dark));
+    store(hn::IfThenElse(exceeds, limited, signal), signal_e + x);
+  };
+  int x = 0;
+  for (; x + n <= in.width; x += n) undo(in.raw_e + x, x);
+  if (x == in.width) return;
+  HWY_ALIGN float last[hn::MaxLanes(Floats())] = {};
+  std::copy(in.raw_e + x, in.raw_e + in.width, last);
+  undo(last, x);
+}
+
 /// Adds to the sums the removed and the stated variance of one site of a vector of cells.
 HWY_INLINE void add_removed(VF noisy, VF value, VF variance, VF& removed, VF& stated) {
   const VF edge = constant(linear_value), limit = hn::Sqrt(hn::Mul(constant(25), variance));
@@ -173,12 +198,14 @@ namespace lowlux::denoise::rows {
 
 HWY_EXPORT(AddSlopes);
 HWY_EXPORT(UnpackCells);
+HWY_EXPORT(UndoExcessive);
 HWY_EXPORT(RemovedCells);
 
 void add_slope_row(const float* const (&luma)[3], int cells, const Slopes& slopes, float* const (&chroma)[2]) {
   HWY_DYNAMIC_DISPATCH(AddSlopes)(luma, cells, slopes, chroma);
 }
 void unpack_row(const UnpackRow& in, const UnpackedRow& out) { HWY_DYNAMIC_DISPATCH(UnpackCells)(in, out); }
+void undo_excessive_row(const ChangedRow& in, float* signal_e) { HWY_DYNAMIC_DISPATCH(UndoExcessive)(in, signal_e); }
 RemovedSums removed_row(const RemovedRow& in) { return HWY_DYNAMIC_DISPATCH(RemovedCells)(in); }
 
 }  // namespace lowlux::denoise::rows

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <random>
 #include <string>
 
 #include "denoise/denoiser.h"
@@ -156,6 +157,88 @@ TEST(NoiseRatio, IsBetterThanOneNoiseForAllWhereSquaresAlternate) {
       EXPECT_LT(mean_db, limits.mean_db);
       EXPECT_LT(db_of_all(both, as_single), -1);
       EXPECT_LT(db_of_all(both, as_mean), -1);
+    }
+  }
+}
+
+/// A dark scene with a lamp in the corner of some squares of 16 px, which have the noise of a short exposure: a raw
+/// that is merged from a bracket.
+struct Bracketed {
+  Plane<float> raw;
+  Plane<float> truth_e;
+  NoiseRatio ratio;
+};
+
+Bracketed bracketed(const Camera& camera, int side_px, float dark_scene_e, float lamp_e, float lamp_ratio,
+                    std::uint64_t seed) {
+  constexpr int block_px = 16;
+  const int blocks = ratio_blocks(side_px, block_px);
+  Bracketed out{Plane<float>(side_px, side_px),
+                Plane<float>(side_px, side_px),
+                {.block_px = block_px, .ratio = Plane<float>(blocks, blocks)}};
+  std::fill_n(out.ratio.ratio.data(), out.ratio.ratio.size(), 1.0f);
+  std::fill_n(out.truth_e.data(), out.truth_e.size(), dark_scene_e);
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    const PhiloxWords words = words_at({.seed = seed}, i, 0);
+    const int column = 1 + static_cast<int>(words[0] % static_cast<std::uint32_t>(blocks - 2));
+    const int row = 1 + static_cast<int>(words[1] % static_cast<std::uint32_t>(blocks - 2));
+    const int width = 2 + static_cast<int>(words[2] % 6), height = 2 + static_cast<int>(words[3] % 6);
+    out.ratio.ratio.at(column, row) = lamp_ratio;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) out.truth_e.at(block_px * column + x, block_px * row + y) = lamp_e;
+    }
+  }
+  for (int y = 0; y < side_px; ++y) {
+    for (int x = 0; x < side_px; ++x) {
+      const float r = view_of(&out.ratio).at(x, y);
+      const double charge = test::noisy_charge_e(static_cast<std::uint32_t>(seed), x, y, out.truth_e.at(x, y) / r,
+                                                 camera.read_noise_e / std::sqrt(r));
+      out.raw.at(x, y) = static_cast<float>(r * charge);
+    }
+  }
+  return out;
+}
+
+// Thresholds next to a lamp are those of its noise, which leaves errors that are many times the noise of the dark
+// sites.
+TEST(NoiseRatio, NextToLampsNoValueIsFurtherThanFiveStandardDeviationsFromItsRawValue) {
+  const std::uint32_t seed = std::random_device{}();
+  std::printf("seed %u\n", seed);
+  int kept = 0;  // values that are at the limit
+  for (std::uint32_t draw = 0; draw < 12; ++draw) {
+    const PhiloxWords words = words_at({.seed = seed}, draw, 1);
+    const auto log_uniform = [](std::uint32_t word, double least, double most) {
+      return static_cast<float>(least * std::pow(most / least, word / 4294967296.0));
+    };
+    const Camera camera{.phase = static_cast<BayerPhase>(words[0] % 4), .white_gain = {1.9, 1, 1.4}};
+    const float scene_e = log_uniform(words[1], 2, 50), lamp_e = scene_e * log_uniform(words[2], 1e3, 1e6);
+    const float lamp_ratio = log_uniform(words[3], 30, 900);
+    const Bracketed frame = bracketed(camera, 192, scene_e, lamp_e, lamp_ratio, seed + draw);
+    for (const Level level : denoise::all_levels) {
+      const Plane<float> got =
+          denoised(frame.raw, camera, view_of(&frame.ratio), {.level = level, .white_gain = camera.white_gain});
+      for (int y = 0; y < got.height(); ++y) {
+        for (int x = 0; x < got.width(); ++x) {
+          const auto value = static_cast<double>(frame.raw.at(x, y)), result = static_cast<double>(got.at(x, y));
+          const double mean = std::max({value, result, 0.02}) + camera.read_noise_e * camera.read_noise_e;
+          const double sigma = std::sqrt(static_cast<double>(view_of(&frame.ratio).at(x, y)) * mean);
+          EXPECT_LE(std::abs(result - value), 5.001 * sigma)
+              << x << ',' << y << ' ' << name_of(level) << ", seed " << seed << ", draw " << draw;
+          kept += std::abs(result - value) > 4.5 * sigma ? 1 : 0;
+        }
+      }
+    }
+  }
+  EXPECT_GT(kept, 0);
+}
+
+TEST(NoiseRatio, AgreesWithTheReferenceNextToLamps) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const Camera camera{.phase = BayerPhase::gbrg, .dark_e = {1, 2, 1, 1}};
+    const Bracketed frame = bracketed(camera, 96, 2, 1e4F, 200, seed);
+    for (const Level level : denoise::all_levels) {
+      const DenoiseOptions options{.level = level, .white_gain = {1.9, 1, 1.4}, .keep_point_sources = false};
+      compare(camera, camera.noise(), frame.raw, options, view_of(&frame.ratio));
     }
   }
 }

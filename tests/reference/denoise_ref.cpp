@@ -232,6 +232,18 @@ Four total_residual(const std::vector<Four>& levels, const Image& starts) {
   return total;
 }
 
+/// Returns `result_e`, with dark charge, or what is nearer to the raw value of pixel (x, y) if they differ by more than
+/// five standard deviations of noise.
+double without_excess(const Frame& frame, int k, int x, int y, double result_e) {
+  if (std::isnan(frame.raw.value.at(x, y))) return result_e;
+  const double ratio = static_cast<double>(frame.raw.noise_ratio.at(x, y));
+  const double measured_e = frame.y(k, x / 2, y / 2), change = result_e - measured_e;
+  const double mean_e = std::max({result_e, measured_e, 0.3 * frame.dark_e[k] + 0.02});
+  const double sigma = std::sqrt(frame.options.variance_scale[0] * ratio * (mean_e + frame.variance_e2[k]));
+  if (std::abs(change) <= 5 * sigma) return result_e;
+  return std::abs(change) >= 10 * sigma ? measured_e : measured_e + change * (10 * sigma / std::abs(change) - 1);
+}
+
 /// Gives saturated cells the chroma of their surroundings.
 void fill_saturated(const Frame& frame, Four& x) {
   Image seen(x[0].width, x[0].height);
@@ -405,7 +417,10 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
         const double x = frame.light(u[k]);
         const double variance = frame.variance_of(k, x / frame.gain[k] + frame.dark_e[k]);
         const double mean = u[k] > frame.edge() ? removed * variance / (4 * frame.offset_e) : 0;
-        out.signal_e.at(at_x, at_y) = measured ? frame.y(k, cx, cy) - frame.dark_e[k] : (x + mean) / frame.gain[k];
+        double result = frame.dark_e[k] + (x + mean) / frame.gain[k];
+        if (measured) result = frame.y(k, cx, cy);
+        if (saturated == 0 && !raw.noise_ratio.is_one()) result = without_excess(frame, k, at_x, at_y, result);
+        out.signal_e.at(at_x, at_y) = result - frame.dark_e[k];
       }
       const double kept = p.residual[0].at(cx, cy);
       out.residual_variance.at(cx, cy) = std::pow(frame.slope(luma), 2) * kept;
