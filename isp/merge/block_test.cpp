@@ -24,19 +24,6 @@ double normal_quantile(double tail) {
   return (low + high) / 2;
 }
 
-/// Holds normal quantiles: of a block by itself, of one next to a block that does not match, and of a site (0: none).
-struct Thresholds {
-  float alone;
-  float neighbour;
-  float site;
-};
-
-Thresholds thresholds_of(double block_false_alarm, double site) {
-  const double alone = block_false_alarm / (2 * neighbour_statistics);
-  return {static_cast<float>(normal_quantile(alone)), static_cast<float>(normal_quantile(std::cbrt(alone))),
-          site > 0 ? static_cast<float>(normal_quantile(site / 2)) : 0};
-}
-
 rows::BlockNoise noise_of(const MosaicNoise& reference, const MosaicNoise& frame) {
   rows::BlockNoise out{};
   const double s = reference.fraction, f = frame.fraction;
@@ -184,7 +171,7 @@ void judge(Grid& grid, int y, const ThresholdsOf& thresholds) {
     for (int v = std::max(y - 1, 0); v <= y; ++v) {
       for (int u = std::max(x - 1, 0); u <= x; ++u) worst = std::max(worst, grid.square[grid.at(u, v)]);
     }
-    const Thresholds& at = thresholds(x);
+    const auto& at = thresholds(x);
     grid.state[grid.at(x, y)] = worst > at.alone ? differs : worst > at.neighbour ? matches_alone : matches;
   }
 }
@@ -226,8 +213,20 @@ MosaicNoise noise_in_light(const PerSite<double>& variance_e2, double light) {
   return out;
 }
 
-Comparison compare_mosaics(PlaneView<const float> reference, const MosaicNoise& reference_noise, PlaneView<float> frame,
-                           const MosaicNoise& frame_noise, const ComparisonOptions& options, Executor& executor) {
+MosaicComparer::Thresholds MosaicComparer::thresholds_of(double block_false_alarm, double site_false_alarm) {
+  const double alone = block_false_alarm / (2 * neighbour_statistics);
+  return {static_cast<float>(normal_quantile(alone)), static_cast<float>(normal_quantile(std::cbrt(alone))),
+          site_false_alarm > 0 ? static_cast<float>(normal_quantile(site_false_alarm / 2)) : 0};
+}
+
+MosaicComparer::MosaicComparer(const MosaicNoise& reference_noise, const MosaicNoise& frame_noise,
+                               const ComparisonOptions& options)
+    : options_(options),
+      noise_{noise_of(reference_noise, frame_noise), noise_of(options.single_frame.noise, frame_noise)},
+      thresholds_{thresholds_of(options.block_false_alarm, options.site_false_alarm),
+                  thresholds_of(options.single_frame.block_false_alarm, options.site_false_alarm)} {}
+
+Comparison MosaicComparer::compare(PlaneView<const float> reference, PlaneView<float> frame, Executor& executor) const {
   assert(reference.width == frame.width && reference.height == frame.height);
   const int columns = (frame.width + block_px - 1) / block_px, rows = (frame.height + block_px - 1) / block_px;
   const std::size_t blocks = static_cast<std::size_t>(columns) * rows;
@@ -237,17 +236,14 @@ Comparison compare_mosaics(PlaneView<const float> reference, const MosaicNoise& 
             std::vector<float>(blocks),
             std::vector<float>(blocks),
             std::vector<std::uint8_t>(blocks)};
-  const SingleFrameBlocks& single = options.single_frame;
-  const std::array noise{noise_of(reference_noise, frame_noise), noise_of(single.noise, frame_noise)};
-  const std::array at{thresholds_of(options.block_false_alarm, options.site_false_alarm),
-                      thresholds_of(single.block_false_alarm, options.site_false_alarm)};
-  const auto kind = [&](int x, int y) { return single.is_single.data != nullptr ? single.is_single.at(x, y) : 0; };
-  const auto error_px = static_cast<float>(options.displacement_error_px);
+  const PlaneView<const std::uint8_t> is_single = options_.single_frame.is_single;
+  const auto kind = [&](int x, int y) { return is_single.data != nullptr ? is_single.at(x, y) : 0; };
+  const auto error_px = static_cast<float>(options_.displacement_error_px);
+  const rows::BlockLimits limits{thresholds_[0].site, error_px * error_px};
   std::vector<std::int64_t> outliers(rows);
   for_each_index(executor, rows, [&](int y) {
     for (int x = 0; x < columns; ++x) {
-      const rows::BlockSums block =
-          add_block(reference, frame, block_px * x, block_px * y, noise[kind(x, y)], {at[0].site, error_px * error_px});
+      const rows::BlockSums block = add_block(reference, frame, block_px * x, block_px * y, noise_[kind(x, y)], limits);
       outliers[y] += block.outliers;
       Sums& sums = grid.sums[grid.at(x, y)];
       sums = statistics_of(block);
@@ -255,15 +251,20 @@ Comparison compare_mosaics(PlaneView<const float> reference, const MosaicNoise& 
     }
   });
   Comparison out{.block_matches = Plane<std::uint8_t>(columns, rows)};
-  const auto alone_differs = [&](int x, int y) { return grid.alone[grid.at(x, y)] > at[kind(x, y)].alone; };
+  const auto alone_differs = [&](int x, int y) { return grid.alone[grid.at(x, y)] > thresholds_[kind(x, y)].alone; };
   for_each_index(executor, rows, [&](int y) { find_squares(grid, y, alone_differs); });
   for_each_index(executor, rows,
-                 [&](int y) { judge(grid, y, [&](int x) -> const Thresholds& { return at[kind(x, y)]; }); });
+                 [&](int y) { judge(grid, y, [&](int x) -> const Thresholds& { return thresholds_[kind(x, y)]; }); });
   for_each_index(executor, rows, [&](int y) {
     for (int x = 0; x < columns; ++x) out.block_matches.at(x, y) = block_matches(grid, x, y) ? 1 : 0;
   });
   summarise(grid, outliers, out);
   return out;
+}
+
+Comparison compare_mosaics(PlaneView<const float> reference, const MosaicNoise& reference_noise, PlaneView<float> frame,
+                           const MosaicNoise& frame_noise, const ComparisonOptions& options, Executor& executor) {
+  return MosaicComparer(reference_noise, frame_noise, options).compare(reference, frame, executor);
 }
 
 }  // namespace lowlux::merge

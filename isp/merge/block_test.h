@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "isp/base/cfa.h"
 #include "isp/base/executor.h"
 #include "isp/base/plane.h"
+#include "isp/merge/block_rows.h"
 
 namespace lowlux::merge {
 
@@ -67,5 +69,29 @@ struct Comparison {
 /// @param frame      as large, in the light of the reference; outliers are set to NaN
 Comparison compare_mosaics(PlaneView<const float> reference, const MosaicNoise& reference_noise, PlaneView<float> frame,
                            const MosaicNoise& frame_noise, const ComparisonOptions& options, Executor& executor);
+
+/// Compares many pairs of mosaics whose noise is the same, such as single blocks: finding the thresholds takes longer
+/// than comparing one block.
+class MosaicComparer {
+ public:
+  MosaicComparer(const MosaicNoise& reference_noise, const MosaicNoise& frame_noise, const ComparisonOptions& options);
+
+  /// See compare_mosaics.
+  Comparison compare(PlaneView<const float> reference, PlaneView<float> frame, Executor& executor) const;
+
+ private:
+  /// Holds normal quantiles: of a block by itself, of one next to a block that does not match, and of a site (0: none).
+  struct Thresholds {
+    float alone;
+    float neighbour;
+    float site;
+  };
+
+  static Thresholds thresholds_of(double block_false_alarm, double site_false_alarm);
+
+  ComparisonOptions options_;
+  std::array<rows::BlockNoise, 2> noise_;  // of the blocks of the mean, and of those of a single frame
+  std::array<Thresholds, 2> thresholds_;   // the same
+};
 
 }  // namespace lowlux::merge

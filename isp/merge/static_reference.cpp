@@ -95,14 +95,13 @@ class ReferenceTest {
 };
 
 /// Returns whether a frame matches the mean in one block, by itself, its outliers included.
-bool matches_in(const Rect& block, const Plane<float>& mean, const MosaicNoise& mean_noise, const Plane<float>& frame,
-                const MosaicNoise& noise, const ComparisonOptions& options) {
-  const ComparisonOptions of_blocks{.block_false_alarm = options.block_false_alarm};
+bool matches_in(const Rect& block, const Plane<float>& mean, const Plane<float>& frame,
+                const MosaicComparer& comparer) {
   Plane<float> part(block.width, block.height);
   for (int y = 0; y < block.height; ++y) std::copy_n(frame.row(block.y + y) + block.x, block.width, part.row(y));
   InlineExecutor alone;
-  const Comparison found = compare_mosaics(mean.view().crop(block.x, block.y, block.width, block.height), mean_noise,
-                                           part.view(), noise, of_blocks, alone);
+  const Comparison found =
+      comparer.compare(mean.view().crop(block.x, block.y, block.width, block.height), part.view(), alone);
   return found.block_matches.at(0, 0) != 0;
 }
 
@@ -110,14 +109,14 @@ bool matches_in(const Rect& block, const Plane<float>& mean, const MosaicNoise& 
 void let_majority_decide(const Plane<float>& mean, const std::vector<Plane<float>>& others, const MosaicNoise& noise,
                          const ComparisonOptions& options, Plane<std::uint8_t>& is_single, Executor& executor) {
   const MosaicNoise mean_noise{noise.variance_e2, noise.fraction / static_cast<double>(others.size())};
+  const MosaicComparer comparer(mean_noise, noise, {.block_false_alarm = options.block_false_alarm});
   for_each_index(executor, is_single.height(), [&](int row) {
     for (int column = 0; column < is_single.width(); ++column) {
       if (is_single.at(column, row) == 0) continue;
       const int x = block_px * column, y = block_px * row;
       const Rect block{x, y, std::min(block_px, mean.width() - x), std::min(block_px, mean.height() - y)};
-      const auto matching = std::ranges::count_if(others, [&](const Plane<float>& other) {
-        return matches_in(block, mean, mean_noise, other, noise, options);
-      });
+      const auto matching = std::ranges::count_if(
+          others, [&](const Plane<float>& other) { return matches_in(block, mean, other, comparer); });
       if (2 * matching > static_cast<std::ptrdiff_t>(others.size()) + 1) is_single.at(column, row) = 0;
     }
   });

@@ -153,6 +153,32 @@ TEST(BlockTest, IsTheSameForAnyNumberOfThreadsAndAnySize) {
   }
 }
 
+TEST(BlockTest, OneComparerJudgesManyBlocksAsEachComparisonDoes) {
+  const Plane<float> scene = test::flat_mosaic(128, 128, 20);
+  const Plane<float> reference = test::noisy_frame(scene, 0, 2, 9, 0);
+  Plane<float> frame = test::noisy_frame(scene, 0, 2, 9, 1);
+  for (int y = 60; y < 100; ++y) {
+    for (int x = 50; x < 90; ++x) frame.at(x, y) += 6;
+  }
+  const MosaicNoise one{test::dark_variance_e2(0, 2), 1}, mean{test::dark_variance_e2(0, 2), 0.25};
+  const ComparisonOptions options{.block_false_alarm = 1e-2};
+  const MosaicComparer comparer(mean, one, options);
+  InlineExecutor executor;
+  int matching = 0;
+  for (int y = 0; y < 128; y += block_px) {
+    for (int x = 0; x < 128; x += block_px) {
+      const auto crop = [&](auto& mosaic) { return mosaic.view().crop(x, y, block_px, block_px); };
+      const Comparison found = comparer.compare(crop(reference), crop(frame), executor);
+      const Comparison expected = compare_mosaics(crop(reference), mean, crop(frame), one, options, executor);
+      EXPECT_EQ(found.block_matches.at(0, 0), expected.block_matches.at(0, 0));
+      EXPECT_EQ(found.mean_chi_square, expected.mean_chi_square);
+      matching += found.block_matches.at(0, 0);
+    }
+  }
+  EXPECT_GT(matching, 150);
+  EXPECT_LT(matching, 256 - 16);  // 25 blocks are those of the object
+}
+
 TEST(BlockTest, WithoutAnyValueNothingIsCompared) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const Plane<float> reference = test::flat_mosaic(32, 32, nan);
