@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -13,7 +14,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr std::array<FrameSize, 3> sizes{{{672, 448}, {1296, 864}, {3680, 2448}}};
+constexpr std::array<FrameSize, 6> sizes{{{128, 96}, {384, 256}, {672, 448}, {1296, 864}, {2112, 1408}, {3680, 2448}}};
 constexpr TimingLight light{20, 5};
 constexpr int frames = 5;  // as many as the robust mean of a camera at rest takes
 constexpr int passes = 3;
@@ -28,10 +29,9 @@ double seconds_of(const MergedRaw& merged, std::string_view stage) {
 class Measurement {
  public:
   Measurement(const FrameSize& size, SpeedProbe& pace, Executor& executor)
-      : frame_(timing_frame(size, light)),
-        megapixels_(1e-6 * size.width * size.height),
-        pace_(pace),
-        executor_(executor) {}
+      : megapixels_(1e-6 * size.width * size.height), pace_(pace), executor_(executor) {
+    for (int i = 0; i < frames; ++i) burst_.push_back(timing_frame(size, light, 0, static_cast<std::uint32_t>(i)));
+  }
 
   Result<void> pass() {
     if (auto done = merge(MergeAlignment::none); !done) return done;
@@ -64,7 +64,9 @@ class Measurement {
     unit_s_ = *unit_s;
     DevelopOptions options;
     options.denoise.mode = DenoiseChoice::Mode::automatic;
-    const FrameReader read = [&](int, bool) { return Result<FrameToMerge>({copy_of(frame_), options, {}}); };
+    const FrameReader read = [&](int index, bool) {
+      return Result<FrameToMerge>({copy_of(burst_[static_cast<std::size_t>(index)]), options, {}});
+    };
     auto merged = merge_frames(frames, read, {.robust = true, .alignment = alignment}, executor_);
     if (!merged) return tl::make_unexpected(merged.error());
     merged_ = *std::move(merged);
@@ -79,7 +81,7 @@ class Measurement {
     add(part, (placing - mean_s) / (frames - 1));
   }
 
-  RawFrame frame_;
+  std::vector<RawFrame> burst_;
   double megapixels_;
   SpeedProbe& pace_;
   Executor& executor_;

@@ -16,12 +16,12 @@ constexpr double black_dn = 512, white_dn = 16383, dn_per_e = 4, read_noise_e = 
 
 }  // namespace
 
-RawFrame timing_frame(const FrameSize& size, const TimingLight& light, double line_noise_e) {
+RawFrame timing_frame(const FrameSize& size, const TimingLight& light, double line_noise_e, std::uint32_t index) {
   RawFrame frame;
   RawDn& raw = frame.raw;
   raw.dn = Plane<std::uint16_t>(size.width, size.height);
   std::vector<float> normal(static_cast<std::size_t>(size.width));
-  const DrawStream stream{.seed = 8, .frame = 0, .purpose = draw_purpose::electrons};
+  const DrawStream stream{.seed = 8, .frame = index, .purpose = draw_purpose::electrons};
   for (int y = 0; y < size.height; ++y) {
     normal_row(stream, 0, static_cast<std::uint32_t>(y), 1, normal);
     const double row_e = line_noise_e * std::sqrt(2) * std::sin(12.9898 * y);

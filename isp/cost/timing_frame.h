@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "isp/base/frame.h"
 
 namespace lowlux::isp {
@@ -19,7 +21,9 @@ struct TimingLight {
 /// every other block of 256 px, the first included. Denoising smooth frames is faster, except for Level::best, and
 /// images contain smooth regions.
 /// @param line_noise_e  standard deviation of the offset of each row, and of each column
-RawFrame timing_frame(const FrameSize& size, const TimingLight& light, double line_noise_e = 0);
+/// @param index         number of the frame in a burst, whose frames differ in their noise
+RawFrame timing_frame(const FrameSize& size, const TimingLight& light, double line_noise_e = 0,
+                      std::uint32_t index = 0);
 
 /// Returns a copy of a simulated frame: its codes, levels, colour and noise.
 RawFrame copy_of(const RawFrame& frame);

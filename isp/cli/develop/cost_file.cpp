@@ -31,7 +31,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int format_number = 6;  // incremented when parts or sizes change
+constexpr int format_number = 7;  // incremented when parts, sizes or frames change
 constexpr std::size_t largest_file = 1 << 20;
 constexpr std::size_t max_points = 100;
 

@@ -42,7 +42,7 @@ enum class CostPart : std::uint8_t {
   residual_median,
   merge_frame,       // black level, noise and electrons of one frame of a merge
   merge_mean,        // adding a frame without motion to the mean
-  merge_robust,      // robust mean of five frames
+  merge_robust,      // robust mean of five frames, and its comparison with the reference frame
   merge_comparison,  // comparison of a frame with the reference
   merge_alignment,   // displacement of a frame
   merge_cells,       // placing a frame in whole cells, and adding it
@@ -103,8 +103,9 @@ double predicted_s(const CostModel& model, const CostSize& size, const std::vect
 inline constexpr std::string_view reference_machine = "two cores of an AMD EPYC with AVX-512";
 
 /// Returns the times of large frames on the reference machine, measured by `lowlux bench --calibrate-cost` when nothing
-/// else ran on it. In units of its pace they are an estimate for a machine that was not measured: parts limited by
-/// memory and parts limited by arithmetic do not scale alike from one processor to another.
+/// else ran on it; those of merging, of frames of 0.01 to 9 MP, follow from its pace. In units of its pace they are an
+/// estimate for a machine that was not measured: parts limited by memory and parts limited by arithmetic do not scale
+/// alike from one processor to another.
 const CostModel& reference_cost();
 
 }  // namespace lowlux::isp

@@ -43,6 +43,13 @@ int predictions_of(int frames) {
   return out;
 }
 
+/// Returns the time of the robust mean of so many frames over that of sampled_frames. Most of it is the comparison with
+/// the reference frame, which takes as long for any number.
+double robust_share(int frames) {
+  constexpr double compared = 3;  // frames whose mean takes as long as the comparison
+  return (compared + frames) / (compared + sampled_frames);
+}
+
 bool motion_is_open(const MergeWork& work) { return !work.alignment && work.frames > 1; }
 
 /// States the cheapest of the methods that are better than the chosen one.
@@ -76,7 +83,7 @@ double predicted_merge_s(const CostModel& cost, const MergeWork& work, const Mer
     add(CostPart::merge_alignment, measured);
     add(CostPart::merge_frame, 1 + n + measured + (compares ? sampled - 1 : 0));
     add(CostPart::merge_mean, n);
-    if (compares) add(CostPart::merge_robust, static_cast<double>(sampled) / sampled_frames);
+    if (compares) add(CostPart::merge_robust, robust_share(sampled));
     if (compares) add(CostPart::merge_comparison, n);
     return predicted_s(cost, work.size, parts);
   }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <random>
@@ -54,8 +55,10 @@ struct Draw {
 bool run(const Draw& draw, std::shared_ptr<CostModel> cost, SpeedProbe& pace, Executor& executor) {
   std::vector<RawFrame> frames;
   frames.reserve(static_cast<std::size_t>(draw.frames));
-  const RawFrame first = timing_frame(draw.size, {20, 5});
-  for (int i = 0; i < draw.frames; ++i) frames.push_back(displaced(first, draw.moves ? i : 0));
+  for (int i = 0; i < draw.frames; ++i) {
+    const RawFrame frame = timing_frame(draw.size, {20, 5}, 0, static_cast<std::uint32_t>(i));
+    frames.push_back(displaced(frame, draw.moves ? i : 0));
+  }
   const double now_s = test::value_of(pace_now(pace, executor));
   cost->pace = now_s / cost->pace_s;
   const MergeWork work{.frames = draw.frames, .size = cost_size(draw.size.width, draw.size.height)};
@@ -95,11 +98,21 @@ int lowlux::test::measure_merge_budget(Arguments& arguments) {
   auto cost = std::make_shared<CostModel>();
   cost->pace_s = value_of(pace_now(pace, executor));
   if (const auto measured = measure_merge_cost(pace, cost->pace_s, executor, *cost); !measured) return 1;
+  std::printf(
+      "time for each megapixel over that of the fixed workload, and as it is without calibration (), of frames of");
+  for (const CostPoint& point : cost->points[static_cast<std::size_t>(CostPart::merge_frame)]) {
+    std::printf(" %.2f", point.megapixels);
+  }
+  std::printf(" MP\n");
   for (int i = static_cast<int>(CostPart::merge_frame); i < cost_parts; ++i) {
     const auto part = static_cast<CostPart>(i);
-    const double ms = 1e3 * cost->seconds(part, cost_size(3680, 2448)) / cost_size(3680, 2448).megapixels;
-    std::printf("%-18s %7.2f ms per MP, %.3f of the fixed workload\n", std::string(name_of(part)).c_str(), ms,
-                1e-3 * ms / cost->pace_s);
+    std::printf("%-18s", std::string(name_of(part)).c_str());
+    for (const CostPoint& point : cost->points[static_cast<std::size_t>(part)]) {
+      const double shipped_s = reference_cost().seconds(part, {.megapixels = point.megapixels});
+      std::printf("  %6.3f (%.3f)", point.seconds / cost->pace_s / point.megapixels,
+                  shipped_s / reference_cost().pace_s / point.megapixels);
+    }
+    std::printf("\n");
   }
   std::mt19937 random(seed);
   const auto whole = [&](int least, int most) { return std::uniform_int_distribution<>(least, most)(random); };

@@ -119,7 +119,7 @@ TEST_F(DatasetFaults, ADamagedSampleThatIsNestedDeeplyIsMadeAgain) {
 }
 
 TEST(CostFile, DeepNestingIsAnError) {
-  const auto cost = cli::parse_cost(R"({"lowlux_cost_model":6,"machine":)" + brackets(200000) + "}");
+  const auto cost = cli::parse_cost(R"({"lowlux_cost_model":7,"machine":)" + brackets(200000) + "}");
   ASSERT_FALSE(cost);
   EXPECT_EQ(cost.error().code, ErrorCode::malformed);
 }

@@ -196,7 +196,7 @@ TEST_F(EffectsCommand, AKeptSpeedIsBelievedOfThisMachineFormatAndNumberOfThreads
     ASSERT_FALSE(model) << to;
     EXPECT_NE(model.error().message.find(why), std::string::npos) << model.error().message;
   };
-  refused_with("\"lowlux_cost_model\": 6", "\"lowlux_cost_model\": 5", "lowlux_cost_model");
+  refused_with("\"lowlux_cost_model\": 7", "\"lowlux_cost_model\": 6", "lowlux_cost_model");
   const Json machine = cli::machine_name();
   refused_with(machine.dump(), "\"\"", "another machine");
   refused_with(" processors", "0 processors", "another machine");
@@ -228,8 +228,8 @@ TEST(CostFile, TextComesBackAndFaultsAreNamed) {
     return text;
   };
   for (const std::string& text :
-       {std::string(), std::string("[]"), std::string("{\"lowlux_cost_model\": 6}"), good.substr(0, good.size() / 2),
-        changed("\"lowlux_cost_model\": 6", "\"x\": 1"), changed("\"threads\": 2", R"("threads": "2")"),
+       {std::string(), std::string("[]"), std::string("{\"lowlux_cost_model\": 7}"), good.substr(0, good.size() / 2),
+        changed("\"lowlux_cost_model\": 7", "\"x\": 1"), changed("\"threads\": 2", R"("threads": "2")"),
         changed("\"threads\": 2", "\"threads\": 0"), changed("\"threads\": 2", "\"threads\": 4294967298"),
         changed("\"look\"", "\"loop\""), changed("9.009", "-1"), changed("9.009", "1e999"), changed("0.0125", "-1"),
         changed("\"pace_s\"", "\"race_s\"")}) {
