@@ -98,6 +98,97 @@ TEST(AutoExposure, SettlesNearTheBestOfAllSettingsAfterEveryStepOfLight) {
               slowest[0], worst);
 }
 
+/// Returns the largest gap between the phases of the flicker that 12 frames show, in periods.
+double largest_gap(double flicker_hz, double frame_s) {
+  std::vector<double> phases;
+  for (int i = 0; i < 12; ++i) phases.push_back(std::fmod(i * flicker_hz * frame_s, 1.0));
+  std::ranges::sort(phases);
+  double out = phases.front() + 1 - phases.back();
+  for (std::size_t i = 1; i < phases.size(); ++i) out = std::max(out, phases[i] - phases[i - 1]);
+  return out;
+}
+
+/// Draws a camera under lamps of 10 to 100 % modulation, whose aliases in the frames are fast or slow.
+MeteredCamera flickering_camera(std::mt19937& random, bool slowly) {
+  MeteredCamera camera = drawn_camera(random);
+  const bool is_50_hz = random() % 2 == 0;
+  camera.flicker_hz = is_50_hz ? 100 : 120;
+  camera.flicker_depth = uniform(random, 0.1, 1);
+  isp::ExposureLimits& limits = camera.setup.limits;
+  limits.mains = random() % 2 == 0 ? isp::Mains::either : is_50_hz ? isp::Mains::hz50 : isp::Mains::hz60;
+  double gap = 0;
+  do {
+    const double rate_hz = std::vector<double>{15, 24, 25, 30, 60}[random() % 5];
+    const double deviation = slowly ? 5e-4 : random() % 2 == 0 ? 0 : 0.03;
+    camera.frame_s = 1 / (rate_hz * (1 + uniform(random, -deviation, deviation)));
+    gap = largest_gap(camera.flicker_hz, camera.frame_s);
+    // Phases that come back exactly are at most three to a period: 1/3. Others must lie closer.
+    if (!slowly && deviation == 0 && gap < 0.99) break;
+  } while (slowly ? gap < 0.5 : gap > 0.25);
+  limits.longest_s = std::min(limits.longest_s, camera.frame_s);
+  return camera;
+}
+
+/// Returns a light that fills the pixels in a time between 0.3 ms and `longest_s`.
+double bright_light(std::mt19937& random, const MeteredCamera& camera, double longest_s) {
+  const double time_s = std::exp(uniform(random, std::log(0.0003), std::log(longest_s)));
+  return camera.setup.gains.front().sensor.full_well_e / camera.scene.back().e_per_s / time_s;
+}
+
+/// Steps of light of up to three decades, up or down, under lamps whose phases 12 frames show: the bounds are those of
+/// steady light.
+TEST(AutoExposure, SettlesAsFastUnderLampsThatFlicker) {
+  const unsigned seed = 20261128;
+  std::printf("seed %u\n", seed);
+  std::mt19937 random(seed);
+  int slowest[2] = {0, 0};
+  for (int trial = 0; trial < 50; ++trial) {
+    MeteredCamera camera = flickering_camera(random, false);
+    isp::ExposureController controller(camera.setup);
+    isp::ExposureMeter meter(camera.format);
+    const double first_light = bright_light(random, camera, 0.02);
+    const double lights[] = {first_light, first_light * std::pow(10, uniform(random, -3, 3)),
+                             bright_light(random, camera, 0.009)};
+    for (const double light : lights) {
+      camera.light = light;
+      const int limit = camera.states ? frames_to_settle : frames_to_settle_blindly;
+      const Outcome outcome = run(camera, controller, meter, limit);
+      slowest[camera.states] = std::max(slowest[camera.states], outcome.frames);
+      SCOPED_TRACE(testing::Message() << "trial " << trial << " light " << light << " rate " << 1 / camera.frame_s
+                                      << " flicker " << camera.flicker_hz << " depth " << camera.flicker_depth);
+      EXPECT_LE(outcome.frames, limit);
+      EXPECT_EQ(outcome.changes, 0);
+      if (controller.choice().clips) continue;
+      double clipped = 0;  // on average; a highlight may pass its limit by 1.5 %, as above
+      for (int i = 0; i < frames_observed; ++i) {
+        ++camera.frame;
+        const double now = 0.98 * camera.light_of_frame(camera.in_effect.exposure_s) / camera.light;
+        clipped += camera.clipped_fraction(camera.in_effect, now) / frames_observed;
+      }
+      EXPECT_LE(clipped, camera.setup.limits.clipped_fraction);
+    }
+  }
+  std::printf("settled within %d frames, %d without stated exposures\n", slowest[1], slowest[0]);
+}
+
+/// Flicker whose alias takes hundreds of frames looks like light that changes slowly: the exposure holds the peak.
+TEST(AutoExposure, SeldomFollowsASlowAliasOfFlicker) {
+  const unsigned seed = 20261129;
+  std::printf("seed %u\n", seed);
+  std::mt19937 random(seed);
+  constexpr int trials = 40;
+  double changes = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    MeteredCamera camera = flickering_camera(random, true);
+    isp::ExposureController controller(camera.setup);
+    isp::ExposureMeter meter(camera.format);
+    camera.light = bright_light(random, camera, 0.009);
+    changes += run(camera, controller, meter, camera.states ? frames_to_settle : frames_to_settle_blindly).changes;
+  }
+  std::printf("%.2f changes in %d frames\n", changes / trials, frames_observed);
+  EXPECT_LT(changes / trials, 0.75);
+}
+
 /// Light so bright that exposures are shorter than half a period: frames of 30 Hz see it flicker.
 TEST(AutoExposure, IsNotMovedByLampsThatFlicker) {
   const unsigned seed = 50;

@@ -24,12 +24,14 @@ struct StatedExposure {
 };
 
 /// Sets exposure time and gain of a stream by choose_exposure(), from the frames themselves. The light is the mean of
-/// the last 16 frames, or fewer since the last setting. A frame whose highlight clips, or differs by more than a
+/// the last 12 frames, or fewer since the last setting. A frame whose highlight clips, or differs by more than a
 /// fourth, is a change of light and is followed at once; otherwise a setting is left after four frames at the earliest,
-/// and only where it loses 1 % of the power of the signal-to-noise ratio, after 16 frames 3 %, so that noise moves
-/// nothing. Exposures shorter than half a period of the mains show flicker: where that moves the highlight of 16 frames
-/// by more than 4 %, its largest value counts until the light changes, by a factor of three. Frames between a setting
-/// and its effect are left out. Allocates nothing after construction.
+/// and only where it loses 1 % of the power of the signal-to-noise ratio, after 12 frames 3 %, so that noise moves
+/// nothing. Exposures shorter than half a period of the mains show flicker: where that moves the highlight of 12 frames
+/// by more than 4 %, its largest value counts, and so does the largest that clipped, until the light changes suddenly,
+/// stays below a third of it for 12 frames, or does not come back to it in 512 frames. Under flicker the peak has 5 %
+/// more room, and a setting is left only where it loses 20 % of the power; a flicker-free one, 50 %. Frames between a
+/// setting and its effect are left out. Allocates nothing after construction.
 class ExposureController {
  public:
   struct Setup {
@@ -72,23 +74,34 @@ class ExposureController {
     double white_e_per_s = 0;  // that would fill the range
     double exposure_s = 0;
   };
+  struct Flicker {
+    bool is_known = false;       // frames differ, or one clipped
+    bool is_seen = false;        // frames of a short exposure differ
+    double peak_e_per_s = 0;     // largest highlight at this setting, or that clipped at any
+    double clipped_e_per_s = 0;  // largest highlight that is known to clip
+    int changes = 0;             // of short exposures since the light changed, by frames that do not clip
+  };
   bool is_awaited(const std::optional<StatedExposure>& stated);
   Metered metered(const MeteredCodes& codes, const StatedExposure& exposed) const;
-  bool shows_flicker(double exposure_s) const;
+  bool is_short(double exposure_s) const;
+  void follow_flicker(Metered& frame, bool other, bool may_flicker);
   bool is_other_light(const Metered& frame, const GainStep& gain) const;
   MeteredLight light_of_frames(bool may_flicker);
   bool may_stay() const;
+  bool may_vary() const;
+  ExposureChoice choice_of(double brightness) const;
 
   std::vector<GainStep> gains_;
   ExposureLimits limits_;
   ExposureSetting setting_;
   int latency_frames_;
   int await_frames_ = 0;
-  std::array<MeteredLight, 16> frames_{};  // the last ones, in turn
+  std::array<MeteredLight, 12> frames_{};  // the last ones, in turn
   int count_ = 0;                          // frames since the last setting, or since the light changed
   std::optional<MeteredLight> light_;      // by which the last decision was made
-  std::optional<double> peak_e_per_s_;     // largest highlight of a light that flickers
-  bool clipped_ = false;                   // the highlight of the last frame
+  Flicker flicker_;
+  int steady_ = 0;      // frames since the highlight changed suddenly
+  int since_peak_ = 0;  // frames since the highlight was at its peak
   bool settled_ = false;
   ExposureChoice choice_;
   int changes_ = 0;
