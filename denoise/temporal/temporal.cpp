@@ -29,12 +29,29 @@ constexpr int search_frames = 8;    // for so many frames after motion was last 
 
 constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit; }
 
+/// Areas of 4 x 4 blocks that are compared with the mean as a whole. They begin at every second block.
+constexpr int area_blocks = 4;
+constexpr int area_step = 2;
+
+/// Sums of rows::BlockSteps over area_step blocks side by side: of R, G, B, and a fourth 0, with which they are two
+/// vectors.
+struct AreaSums {
+  std::array<float, 4> sum{};
+  std::array<float, 4> variance{};
+
+  void add(const AreaSums& other) {
+    for (int c = 0; c < 4; ++c) sum[c] += other.sum[c];
+    for (int c = 0; c < 4; ++c) variance[c] += other.variance[c];
+  }
+};
+
 /// Buffers for a strip at the end of rows, which is copied in and out.
 struct StripMemory {
   std::array<std::array<float, sites_of_strip>, motion_block> raw{};
   std::array<std::array<float, sites_of_strip>, motion_block> out{};
   std::array<std::array<float, sites_of_strip>, motion_block> before{};
   float sums[2][sites_of_strip]{};
+  rows::BlockSteps steps{};
 };
 
 [[maybe_unused]] bool usable(const RawNoise& noise, double light, const TemporalOptions& options) {
@@ -55,6 +72,8 @@ struct Memory {
         mean_e(rounded_up(largest_width, sites_of_strip) + 16, rounded_up(largest_height, motion_block)),
         share(rounded_up(largest_width, sites_of_strip) / motion_block, mean_e.height() / motion_block),
         moved(share.width(), share.height()),
+        steps(share.width() / area_step, share.height()),
+        offset(steps.width(), rounded_up(share.height(), area_step) / area_step),
         motion(largest_width, largest_height),
         next_mean_e(mean_e.width(), mean_e.height()),
         next_share(share.width(), share.height()),
@@ -80,6 +99,8 @@ struct Memory {
   Plane<float> mean_e;  // without dark charge
   Plane<float> share;   // of each block: ratio of the variance of the mean to that of a raw value
   Plane<std::uint8_t> moved;
+  Plane<AreaSums> steps;  // of area_step blocks side by side
+  Plane<float> offset;    // of each area: mean square of its difference from the mean, over the variance of raw values
   FrameMotion motion;
   Plane<float> next_mean_e;  // mean and shares that follow, while the previous ones are displaced
   Plane<float> next_share;
@@ -116,6 +137,8 @@ struct Frame {
   void displace(const Workers& workers, bool same) const;
   void find(int y, const MotionThresholds& at, StripMemory& strip) const;
   bool has_moved(int x, int y) const;
+  float offset_of_area(int x, int y, double threshold) const;
+  void add_offsets(int y) const;
   long long update(int y, PlaneView<float> out, StripMemory& strip) const;
   void put_fractions(int y, PlaneView<float> map) const;
   void take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const;
@@ -219,11 +242,55 @@ void Frame::find(int y, const MotionThresholds& at, StripMemory& strip) const {
     in.width = std::min(sites_of_strip, raw.value.width - left);
     in.share = new_share().row(y) + x;
     std::uint8_t* const moved = memory.moved.row(y) + x;
-    rows::find_motion(in, moved);
+    rows::BlockSteps& steps = strip.steps;
+    rows::find_motion(in, moved, steps);
+    for (int b = 0; b < blocks_of_strip; b += area_step) {
+      AreaSums& out = memory.steps.at((x + b) / area_step, y);
+      for (int c = 0; c < 3; ++c) {
+        out.sum[c] = steps.sum[c][b] + steps.sum[c][b + 1];
+        out.variance[c] = steps.variance[c][b] + steps.variance[c][b + 1];
+      }
+    }
     // Blocks without content start anew, and say nothing of their neighbours.
     for (int b = 0; displaced && b < blocks_of_strip; ++b) {
       if (in.share[b] >= FrameMotion::no_content) moved[b] = 0;
     }
+  }
+}
+
+/// Returns the mean square by which an area differs from the mean, over the variance of raw values; 0 where noise
+/// explains it.
+/// @param x, y  of the area, in steps
+float Frame::offset_of_area(int x, int y, double threshold) const {
+  const int left = area_step * x, top = area_step * y;
+  const int right = std::min(left + area_blocks, columns), bottom = std::min(top + area_blocks, rows);
+  AreaSums all;
+  for (int v = top; v < bottom; ++v) {
+    for (int u = x; area_step * u < right; ++u) all.add(memory.steps.at(u, v));
+  }
+  double step = 0, colours = 0;
+  for (int c = 0; c < 3; ++c) {
+    if (all.variance[c] <= 0) continue;
+    step += static_cast<double>(all.sum[c]) * static_cast<double>(all.sum[c]) / static_cast<double>(all.variance[c]);
+    colours += 1;
+  }
+  if (step <= threshold) return 0;
+  const int width = std::min(motion_block * right, raw.value.width) - motion_block * left;
+  const int height = std::min(motion_block * bottom, raw.value.height) - motion_block * top;
+  return static_cast<float>((step - colours) / (width * height));
+}
+
+/// Adds to the mean's variance ratios of a row of blocks the largest offset of the areas that have the block.
+void Frame::add_offsets(int y) const {
+  const int area_y = y / area_step;
+  for (int x = 0; x < columns; ++x) {
+    const int area_x = x / area_step;
+    float offset = 0;
+    for (int v = std::max(area_y - 1, 0); v <= area_y; ++v) {
+      for (int u = std::max(area_x - 1, 0); u <= area_x; ++u) offset = std::max(offset, memory.offset.at(u, v));
+    }
+    float& share = new_share().at(x, y);
+    share = std::min(share + offset, FrameMotion::no_content);
   }
 }
 
@@ -298,7 +365,8 @@ void Frame::displace(const Workers& workers, bool same) const {
   memory.motion.find(raw, noise, before, memory.next_share.view().crop(0, 0, columns, rows), workers);
 }
 
-/// Adds the frame to the mean, and counts blocks that moved in memory.count.
+/// Adds the frame to the mean, and counts blocks that moved in memory.count. Offsets of areas are added for the next
+/// frame, because the rows below would otherwise have to be compared first.
 void Frame::take_in(const Workers& workers, PlaneView<float> out, PlaneView<float> shares) const {
   const bool same = light == 1 && noise == memory.noise;
   if (displaced) displace(workers, same);
@@ -322,6 +390,18 @@ void Frame::take_in(const Workers& workers, PlaneView<float> out, PlaneView<floa
       memory.count[thread] += update(y, out, strip);
       if (shares.data != nullptr) put_fractions(y, shares);
     }
+  });
+  if (first) return;
+  const double threshold = chi3_threshold(at.alone);
+  in_bands(workers, (rows + area_step - 1) / area_step, [&](int top, int bottom, int) {
+    for (int y = top; y < bottom; ++y) {
+      for (int x = 0; x < (columns + area_step - 1) / area_step; ++x) {
+        memory.offset.at(x, y) = offset_of_area(x, y, threshold);
+      }
+    }
+  });
+  in_bands(workers, rows, [&](int top, int bottom, int) {
+    for (int y = top; y < bottom; ++y) add_offsets(y);
   });
 }
 

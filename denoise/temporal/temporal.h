@@ -19,7 +19,8 @@ struct TemporalOptions {
 ///
 /// Blocks of 8 x 8 sites are compared with the mean of the previous frames. Those that differ by more than the noise
 /// model explains, and their neighbours at a lower threshold, start anew. In scenes that move, the mean is first
-/// displaced by what FrameMotion finds, if frames have at least FrameMotion::min_side pixels each way. After n <=
+/// displaced by what FrameMotion finds, if frames have at least FrameMotion::min_side pixels each way. Areas of 32 x 32
+/// sites that differ by less, but by more than their noise, count with a larger variance from then on. After n <=
 /// max_frames still frames of equal light the mean's variance is 1 / n of a raw value's; with more frames it falls to 1
 /// / (2 max_frames - 1).
 ///
@@ -28,7 +29,7 @@ struct TemporalOptions {
 class TemporalMean {
  public:
   /// Allocates for mosaics of up to max_width x max_height pixels, each 2..65536, and up to `threads` of an executor's
-  /// threads: 9.7 bytes for each pixel, rows rounded up to 128 pixels, and 13 KB for each thread.
+  /// threads: 10 bytes for each pixel, rows rounded up to 128 pixels, and 13 KB for each thread.
   TemporalMean(int max_width, int max_height, int threads);
   ~TemporalMean();
   TemporalMean(const TemporalMean&) = delete;

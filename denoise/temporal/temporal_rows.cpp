@@ -146,6 +146,8 @@ struct Statistics {
   VF step;
   VF step_mean;
   VF step_variance;
+  VF change[3];  // of R, G, B: sum of the differences over their variances without that of the mean
+  VF weight[3];  // and the variance of this sum, in the same way
 };
 
 /// Returns the statistics of the blocks `first` and on.
@@ -154,13 +156,14 @@ HWY_INLINE Statistics statistics_of(const Sums& sums, int first, VF s) {
   const Floats f;
   const VF one = constant(1), scale = hn::Div(one, hn::Add(one, s)), fresh = hn::Mul(s, scale), less = hn::Sub(one, s);
   const VF sharp = hn::Mul(scale, hn::Add(less, hn::Mul(s, s)));  // (1 + s^3) / (1 + s)^2
+  VF change[3], weight[3];
   VF step = hn::Zero(f), colours = hn::Zero(f), sites = hn::Zero(f), poisson = hn::Zero(f), excess = hn::Zero(f);
   for (int c = 0; c < 3; ++c) {
-    const VF change = of_blocks(sums, Sums::change + c, first), count = of_blocks(sums, Sums::count + c, first);
-    const VF weight = of_blocks(sums, Sums::weight + c, first), own = of_blocks(sums, Sums::poisson + c, first);
+    change[c] = of_blocks(sums, Sums::change + c, first), weight[c] = of_blocks(sums, Sums::weight + c, first);
+    const VF count = of_blocks(sums, Sums::count + c, first), own = of_blocks(sums, Sums::poisson + c, first);
     const MF any = hn::Gt(count, hn::Zero(f));
     const VF n = hn::Max(count, one);
-    step = hn::Add(step, hn::Div(hn::Mul(change, change), hn::IfThenElse(any, weight, one)));
+    step = hn::Add(step, hn::Div(hn::Mul(change[c], change[c]), hn::IfThenElse(any, weight[c], one)));
     colours = hn::Add(colours, hn::IfThenElseZero(any, one));
     sites = hn::Add(sites, count);
     poisson = hn::Add(poisson, own);
@@ -176,7 +179,9 @@ HWY_INLINE Statistics statistics_of(const Sums& sums, int first, VF s) {
       hn::Add(hn::Add(free, free), hn::Add(of_poisson, of_steady)),
       step,
       colours,
-      hn::Add(hn::Add(colours, colours), hn::Mul(sharp, excess))};
+      hn::Add(hn::Add(colours, colours), hn::Mul(sharp, excess)),
+      {change[0], change[1], change[2]},
+      {weight[0], weight[1], weight[2]}};
 }
 
 HWY_INLINE MF moved_at(const Statistics& s, const Threshold& at) {
@@ -184,7 +189,7 @@ HWY_INLINE MF moved_at(const Statistics& s, const Threshold& at) {
                 exceeds(s.step, s.step_mean, s.step_variance, at.z, constant(at.few)));
 }
 
-void FindMotion(const MotionStrip& in, std::uint8_t* moved) {
+void FindMotion(const MotionStrip& in, std::uint8_t* moved, BlockSteps& steps) {
   HWY_ALIGN float weights[cells_of_strip];
   for (int b = 0; b < blocks_of_strip; ++b) {
     const float best = in.share[b] / (1 + in.share[b]), weight = best > in.min_weight ? best : in.min_weight;
@@ -198,9 +203,16 @@ void FindMotion(const MotionStrip& in, std::uint8_t* moved) {
   }
   HWY_ALIGN float level[blocks_of_strip];
   for (int b = 0; b < blocks_of_strip; b += lanes()) {
-    const Statistics s = statistics_of(sums, b, load(in.share + b));
+    const VF share = load(in.share + b);
+    const Statistics s = statistics_of(sums, b, share);
     const VF beside = hn::IfThenElseZero(moved_at(s, in.beside), constant(1));
-    store(hn::IfThenElse(moved_at(s, in.alone), constant(2), beside), level + b);
+    const MF alone = moved_at(s, in.alone);
+    store(hn::IfThenElse(alone, constant(2), beside), level + b);
+    const VF scale = hn::IfThenZeroElse(alone, hn::Div(constant(1), hn::Add(constant(1), share)));
+    for (int c = 0; c < 3; ++c) {
+      store(hn::Mul(scale, s.change[c]), steps.sum[c] + b);
+      store(hn::Mul(scale, s.weight[c]), steps.variance[c] + b);
+    }
   }
   for (int b = 0; b < blocks_of_strip; ++b) moved[b] = static_cast<std::uint8_t>(level[b]);
 }
@@ -251,7 +263,9 @@ HWY_EXPORT(FindMotion);
 HWY_EXPORT(ScaleMean);
 HWY_EXPORT(UpdateMean);
 
-void find_motion(const MotionStrip& in, std::uint8_t* moved) { HWY_DYNAMIC_DISPATCH(FindMotion)(in, moved); }
+void find_motion(const MotionStrip& in, std::uint8_t* moved, BlockSteps& steps) {
+  HWY_DYNAMIC_DISPATCH(FindMotion)(in, moved, steps);
+}
 void scale_mean(const ScaleStrip& in, float (*sums)[sites_of_strip]) { HWY_DYNAMIC_DISPATCH(ScaleMean)(in, sums); }
 void update_mean(const UpdateStrip& in) { HWY_DYNAMIC_DISPATCH(UpdateMean)(in); }
 

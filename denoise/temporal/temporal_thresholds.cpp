@@ -25,13 +25,19 @@ double chi3_tail(double x) {
   return std::erfc(std::sqrt(x / 2)) + std::sqrt(2 * x / std::numbers::pi) * std::exp(-x / 2);
 }
 
+/// Returns the quantile of chi-square with 3 degrees of freedom of Wilson and Hilferty.
+double approximate_chi3(double z) {
+  const double by_shape = 1 / 1.5;
+  return 3 * std::pow(1 - by_shape / 9 + z / 3 * std::sqrt(by_shape), 3);
+}
+
 /// Returns the threshold for a rate of false alarms.
 /// @param rate  at which either of two independent statistics is above its threshold
 MotionThreshold threshold_of(double rate) {
-  const double of_one = 1 - std::sqrt(1 - rate), shape = 1.5;
+  const double of_one = 1 - std::sqrt(1 - rate);
   const double z = solve(-10, 10, of_one, normal_tail);
   const double exact = solve(0, 200, of_one, chi3_tail);
-  return {.z = z, .few = exact / (3 * std::pow(1 - 1 / (9 * shape) + z / (3 * std::sqrt(shape)), 3))};
+  return {.z = z, .few = exact / approximate_chi3(z)};
 }
 
 }  // namespace
@@ -41,6 +47,8 @@ MotionThresholds motion_thresholds(double false_alarm) {
   const auto still = [beside](double alone) { return 1 - alone - (beside - alone) * (1 - std::pow(1 - alone, 8)); };
   return {.alone = threshold_of(solve(0, false_alarm, 1 - false_alarm, still)), .beside = threshold_of(beside)};
 }
+
+double chi3_threshold(const MotionThreshold& at) { return at.few * approximate_chi3(at.z); }
 
 rows::SiteNoise site_noise(const RawNoise& noise, BayerPhase phase) {
   const PerSite<int> site = sites_of(phase);

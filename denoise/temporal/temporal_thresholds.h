@@ -30,6 +30,9 @@ struct MotionThresholds {
 /// @param false_alarm  1e-6..0.5
 MotionThresholds motion_thresholds(double false_alarm);
 
+/// Returns the threshold of a chi-square variable of 3 degrees of freedom.
+double chi3_threshold(const MotionThreshold& at);
+
 inline constexpr double largest_value_e = 1e9;  // limit of values, of either sign
 
 rows::SiteNoise site_noise(const RawNoise& noise, BayerPhase phase);

@@ -96,6 +96,44 @@ TEST(TemporalFalseAlarms, OfStillFramesAreThoseAskedFor) {
   }
 }
 
+// An area that is wrongly found to differ keeps its history, at a larger share: next to those of blocks that started
+// anew up to two frames ago, no other share differs from 1 / n. Each block lies in four areas.
+TEST(TemporalFalseAlarms, OfAreasOfStillFramesAreNotMoreThanAskedFor) {
+  for (const double rate : {0.01, 0.1}) {
+    for (const double mean_e : {4.0, 100.0, 1e4}) {
+      Stream stream(1024, 1024, {.read_noise_e = 2}, {.false_alarm = rate});
+      for (std::uint64_t n = 0; n < 3; ++n) stream.take(grey(mean_e), 1500 + n);
+      MeanOf alarms;  // of areas: those of a tile of 8 x 8 blocks hardly depend on those of others
+      for (int tile = 0; tile < 16 * 16; ++tile) {
+        double larger = 0;
+        for (int block = 0; block < 64; ++block) {
+          const float share = stream.share.at(4 * (8 * (tile % 16) + block % 8), 4 * (8 * (tile / 16) + block / 8));
+          const auto is = [share](float other) { return std::abs(share - other) < 1e-5f; };
+          larger += is(1.0f / 3) || is(0.5f) || is(1) ? 0 : 1;
+        }
+        alarms.add(larger / 64);
+      }
+      EXPECT_GT(alarms.mean(), 0);
+      EXPECT_LT(alarms.mean() - 5 * alarms.standard_error(), rate) << mean_e;
+    }
+  }
+}
+
+// A fifth of a standard deviation makes a step of 3 in a block of 64 sites, and of 41 in an area of 1024: the square of
+// the change is added to the relative variance.
+TEST(TemporalMotion, OfAreasBelowTheThresholdOfBlocksIsInTheVariance) {
+  const double mean_e = 100, changed = 0.2;
+  Stream stream(256, 256, {.read_noise_e = 2}, {.false_alarm = never});
+  for (std::uint64_t n = 0; n < 16; ++n) stream.take(grey(mean_e), 4200 + n);
+  const double after = mean_e + changed * std::sqrt(mean_e + 4);
+  EXPECT_LT(stream.take(grey(after), 4300), 0.01) << "no block sees it";
+  stream.take(grey(after), 4301);
+  const double before = 1.0 / 17 + changed * changed, expected = before / (1 + before);
+  MeanOf share;
+  for (std::size_t i = 0; i < stream.share.size(); ++i) share.add(static_cast<double>(stream.share.data()[i]));
+  EXPECT_NEAR(share.mean(), expected, 0.1 * expected) << "the largest of four areas, over 1 + s";
+}
+
 // Tables: normal quantiles, and chi-square of 3 degrees of freedom at 5 % (7.815) and 0.1 % (16.266). With `alone` a
 // and `beside` b, a + (b - a) (1 - (1 - a)^8) is the rate.
 TEST(TemporalThresholds, AreThoseOfTables) {

@@ -70,7 +70,7 @@ void TemporalMean::rescale(const Now& now, double light, int x, int y) {
   share = std::min(share * light * light * before / after, 1e6);
 }
 
-int TemporalMean::level_of(const Now& now, int x, int y, const denoise::MotionThresholds& at) const {
+int TemporalMean::level_of(const Now& now, int x, int y, const denoise::MotionThresholds& at) {
   const double s = blocks_.at(x, y).share, weight = std::max(s / (1 + s), now.min_weight), fresh = s / (1 + s);
   double squares = 0, bias = 0, steady = 0, poisson = 0, sites = 0;
   std::array<double, 3> change{}, weights{}, electrons{}, count{};
@@ -111,8 +111,45 @@ int TemporalMean::level_of(const Now& now, int x, int y, const denoise::MotionTh
   const auto moved = [&](const denoise::MotionThreshold& t) {
     return above(spread, mean, variance, t.z, 1) || above(step, colours, 2 * colours + excess, t.z, t.few);
   };
+  Block& block = blocks_.at(x, y);
+  block.step.fill(0), block.step_variance.fill(0);
   if (moved(at.alone)) return 2;
+  for (std::size_t c = 0; c < 3; ++c)
+    block.step[c] = change[c] / (1 + s), block.step_variance[c] = weights[c] / (1 + s);
   return moved(at.beside) ? 1 : 0;
+}
+
+/// Adds to the shares what areas of 4 x 4 blocks, at every second block, differ by as a whole.
+void TemporalMean::add_offsets(const denoise::MotionThreshold& at) {
+  const int columns = blocks_.width(), rows = blocks_.height(), width = mean_e.width(), height = mean_e.height();
+  Plane<double> offset(columns, rows);
+  std::fill(offset.data(), offset.data() + offset.size(), 0.0);
+  for (int top = 0; top < rows; top += 2) {
+    for (int left = 0; left < columns; left += 2) {
+      const int right = std::min(left + 4, columns), bottom = std::min(top + 4, rows);
+      std::array<double, 3> sum{}, variance{};
+      const auto each_block = [&](const auto& work) {
+        for (int y = top; y < bottom; ++y) {
+          for (int x = left; x < right; ++x) work(x, y);
+        }
+      };
+      each_block([&](int x, int y) {
+        for (std::size_t c = 0; c < 3; ++c) {
+          sum[c] += blocks_.at(x, y).step[c], variance[c] += blocks_.at(x, y).step_variance[c];
+        }
+      });
+      double step = 0, colours = 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        if (variance[c] > 0) step += sum[c] * sum[c] / variance[c], colours += 1;
+      }
+      if (!above(step, 3, 6, at.z, at.few)) continue;
+      const int sites = (std::min(side * right, width) - side * left) * (std::min(side * bottom, height) - side * top);
+      each_block([&](int x, int y) { offset.at(x, y) = std::max(offset.at(x, y), (step - colours) / sites); });
+    }
+  }
+  for (std::size_t i = 0; i < offset.size(); ++i) {
+    blocks_.data()[i].share = std::min(blocks_.data()[i].share + offset.data()[i], 1e6);
+  }
 }
 
 bool TemporalMean::has_moved(int x, int y) const {
@@ -170,7 +207,8 @@ double TemporalMean::run(const denoise::RawElectronsView& raw, const denoise::Ra
     for (int y = 0; y < blocks_.height(); ++y) {
       for (int x = 0; x < blocks_.width(); ++x) {
         Block& block = blocks_.at(x, y);
-        block.level = displaced && block.share >= 1e6 ? 0 : level_of(now, x, y, at);
+        block.level = level_of(now, x, y, at);
+        if (displaced && block.share >= 1e6) block.level = 0;
       }
     }
   }
@@ -192,6 +230,7 @@ double TemporalMean::run(const denoise::RawElectronsView& raw, const denoise::Ra
       });
     }
   }
+  if (!first) add_offsets(denoise::motion_thresholds(options.false_alarm).alone);
   noise_ = noise;
   phase_ = raw.phase;
   moved /= static_cast<double>(blocks_.size());

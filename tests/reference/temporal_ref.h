@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "denoise/temporal/temporal.h"
 #include "denoise/temporal/temporal_thresholds.h"
 #include "tests/reference/motion_ref.h"
@@ -19,11 +21,14 @@ class TemporalMean {
  private:
   struct Block {
     double share = 1;
-    int level = 2;  // 2: moved; 1: moved if a neighbour has
+    int level = 2;                          // 2: moved; 1: moved if a neighbour has
+    std::array<double, 3> step{};           // of each colour: sum of the differences over their variances,
+    std::array<double, 3> step_variance{};  // and the variance of this sum; 0 if the block moved
   };
   struct Now;
   void rescale(const Now& now, double light, int x, int y);
-  int level_of(const Now& now, int x, int y, const denoise::MotionThresholds& at) const;
+  int level_of(const Now& now, int x, int y, const denoise::MotionThresholds& at);
+  void add_offsets(const denoise::MotionThreshold& at);
   bool has_moved(int x, int y) const;
   void displace(const Now& now);
 

@@ -13,6 +13,8 @@
 
 #include "isp/pipeline/render/map_views.h"
 #include "isp/pipeline/render/noise_reducer.h"
+#include "tests/denoise/draws.h"
+#include "tests/denoise/frames.h"
 #include "tests/sensor_bench/picture_raw.h"
 
 namespace lowlux::isp {
@@ -229,6 +231,70 @@ TEST(TemporalBlend, OfASceneThatMovesIsNotWorseThanTheLevelAlone) {
     for (int frame = 1; frame <= 6; ++frame) reducers.next();
     EXPECT_GT(reducers.both_db(), reducers.level_db() - 0.3) << name;
   }
+}
+
+/// A glow without edges that moves over grey: a Gaussian, drawn at random.
+struct SoftLight {
+  double mean_e, contrast_e, sigma_px, speed_px, angle;
+
+  static SoftLight draw(std::uint32_t seed) {
+    std::mt19937 random(seed);
+    const auto between = [&random](double min, double max) {
+      return std::uniform_real_distribution<double>(min, max)(random);
+    };
+    const double mean_e = std::exp(between(std::log(4.0), std::log(100.0)));
+    return {mean_e, std::sqrt(mean_e + read_e2) * between(0.5, 2), between(20, 60), between(1, 6), between(0, 6.28)};
+  }
+  /// Returns the signal, and the distance from the middle in units of sigma.
+  std::pair<double, double> at(int x, int y, int side, int step) const {
+    const double u = x - 0.5 * side - speed_px * step * std::cos(angle);
+    const double v = y - 0.5 * side - speed_px * step * std::sin(angle);
+    const double distance = std::hypot(u, v) / sigma_px;
+    return {mean_e + contrast_e * std::exp(-0.5 * distance * distance), distance};
+  }
+};
+
+// Within two sigma of its middle, a light's error must not exceed that of the level, except by chance: 5 standard
+// errors of the mean over lights.
+TEST(TemporalBlend, OfASoftLightThatMovesIsNotWorseThanTheLevelAlone) {
+  constexpr int side = 320, frames = 18, measured = 6;
+  InlineExecutor one;
+  test::MeanOf excess;  // of each light: mean square error over that of the level, less 1
+  for (std::uint32_t seed = 1; seed <= 12; ++seed) {
+    const SoftLight light = SoftLight::draw(seed);
+    NoiseReducer together(one), level_only(one);
+    Plane<float> both(side, side), level(side, side);
+    double both_e2 = 0, level_e2 = 0;
+    for (int frame = 1; frame <= frames; ++frame) {
+      const denoise_testing::Camera camera{.phase = phase, .read_noise_e = read_noise_e};
+      const auto signal = [&](int x, int y) { return light.at(x, y, side, frame - frames + measured); };
+      const denoise_testing::Scene scene = [&](int x, int y) {
+        const double e = signal(x, y).first;
+        return std::array{e, e, e};
+      };
+      const auto raw = denoise_testing::exposed(camera, scene, side, side, 1000 * seed + static_cast<unsigned>(frame));
+      const auto reduce = [&](NoiseReducer& reducer, bool temporal, Plane<float>& out) {
+        NoiseReduction with = how(true, temporal, frame == 1);
+        with.level = with.options.level = denoise::Level::standard;
+        reducer.run(whole(side, side), with, raw.view(), out.view());
+      };
+      reduce(together, true, both);
+      if (frame <= frames - measured) continue;
+      reduce(level_only, false, level);
+      for (int y = 0; y < side; ++y) {
+        for (int x = 0; x < side; ++x) {
+          const auto [truth_e, distance] = signal(x, y);
+          if (distance > 2) continue;
+          both_e2 += std::pow(static_cast<double>(both.at(x, y)) - truth_e, 2);
+          level_e2 += std::pow(static_cast<double>(level.at(x, y)) - truth_e, 2);
+        }
+      }
+    }
+    excess.add(both_e2 / level_e2 - 1);
+    std::printf("seed %2u: %5.1f e-, contrast %4.1f e-, sigma %2.0f px, %.1f px each frame: %5.2f dB\n", seed,
+                light.mean_e, light.contrast_e, light.sigma_px, light.speed_px, 10 * std::log10(both_e2 / level_e2));
+  }
+  EXPECT_LT(excess.mean(), 5 * excess.standard_error());
 }
 
 // Nightly: the table behind the largest detail, PSNR [dB] as means over all pictures.
