@@ -78,12 +78,19 @@ struct BlendSites {
   float mean_e2(int i) const { return share[i] * (std::max(signal_e[2 * i] + dark_e, 0.0f) + variance_e2); }
 };
 
-/// Adds the squared differences less their expectation to the sums of cells. The frame is in both results, so that the
-/// mean shares a part `share` of the level's noise.
-void add_detail(const BlendSites& in, float* sums) {
+/// Sums over the sites of cells.
+struct CellSums {
+  std::array<float, strip_cells> squares{};  // of differences, less their expectation
+  std::array<float, strip_cells> differences{};
+};
+
+/// Adds the differences to the sums of cells. The frame is in both results, so that the mean shares a part `share` of
+/// the level's noise.
+void add_detail(const BlendSites& in, CellSums& sums) {
   for (int i = 0; i < in.sites; ++i) {
     const float d = in.difference(i);
-    sums[i] += d * d - in.mean_e2(i) - (1 - 2 * in.share[i]) * in.level_e2[i];
+    sums.differences[i] += d;
+    sums.squares[i] += d * d - in.mean_e2(i) - (1 - 2 * in.share[i]) * in.level_e2[i];
   }
 }
 
@@ -96,15 +103,18 @@ void blend_sites(const BlendSites& in, const float* detail_e2) {
   }
 }
 
-/// Replaces the sums of cells by the mean over the sites of their block, at least 0.
+/// Replaces the sums of squares by the mean over the sites of their block without that of the mean difference, at least
+/// 0: a level keeps the means of blocks, so that what differs there has moved.
 /// @param columns  of sites
-void average_blocks(float* sums, int columns, int rows) {
+void average_blocks(CellSums& sums, int columns, int rows) {
   constexpr int block = 2 * block_cells;
   for (int x = 0; x < columns; x += block) {
     const int first = x / 2, sites = std::min(block, columns - x), last = first + (sites + 1) / 2;
-    float sum = 0;
-    for (int i = first; i < last; ++i) sum += sums[i];
-    std::fill(sums + first, sums + last, std::max(sum / static_cast<float>(sites * rows), 0.0f));
+    const auto count = static_cast<float>(sites * rows);
+    float squares = 0, differences = 0;
+    for (int i = first; i < last; ++i) squares += sums.squares[i], differences += sums.differences[i];
+    const float detail_e2 = std::max((squares - differences * differences / count) / count, 0.0f);
+    std::fill(sums.squares.begin() + first, sums.squares.begin() + last, detail_e2);
   }
 }
 
@@ -225,7 +235,7 @@ void NoiseReducer::blend(BayerPhase phase, const NoiseReduction& how, const deno
     for (int top = block * band.first; top < std::min(block * band.last, signal_e.height); top += block) {
       const int bottom = std::min(top + block, signal_e.height);
       for (int cell = 0; cell < cells; cell += strip_cells) {
-        std::array<float, strip_cells> detail_e2{};
+        CellSums sums;
         const auto each_row = [&](const auto& work) {
           for (int y = top; y < bottom; ++y) {
             for (int column = 0; column < columns; ++column) {
@@ -233,9 +243,9 @@ void NoiseReducer::blend(BayerPhase phase, const NoiseReduction& how, const deno
             }
           }
         };
-        each_row([&](const BlendSites& sites) { add_detail(sites, detail_e2.data()); });
-        average_blocks(detail_e2.data(), std::min(2 * strip_cells, signal_e.width - 2 * cell), bottom - top);
-        each_row([&](const BlendSites& sites) { blend_sites(sites, detail_e2.data()); });
+        each_row([&](const BlendSites& sites) { add_detail(sites, sums); });
+        average_blocks(sums, std::min(2 * strip_cells, signal_e.width - 2 * cell), bottom - top);
+        each_row([&](const BlendSites& sites) { blend_sites(sites, sums.squares.data()); });
       }
     }
   });
