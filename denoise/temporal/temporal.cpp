@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -32,16 +33,18 @@ constexpr int rounded_up(int n, int unit) { return (n + unit - 1) / unit * unit;
 /// Areas of 4 x 4 blocks that are compared with the mean as a whole. They begin at every second block.
 constexpr int area_blocks = 4;
 constexpr int area_step = 2;
+constexpr float no_step = std::numeric_limits<float>::max();  // of an area without sites that count
 
-/// Sums of rows::BlockSteps over area_step blocks side by side: of R, G, B, and a fourth 0, with which they are two
-/// vectors.
+/// Sums of rows::BlockSteps over blocks, of R, G, B.
 struct AreaSums {
-  std::array<float, 4> sum{};
-  std::array<float, 4> variance{};
+  std::array<float, 3> sum{};
+  std::array<float, 3> variance{};
+  std::array<float, 3> count{};
 
   void add(const AreaSums& other) {
-    for (int c = 0; c < 4; ++c) sum[c] += other.sum[c];
-    for (int c = 0; c < 4; ++c) variance[c] += other.variance[c];
+    for (int c = 0; c < 3; ++c) sum[c] += other.sum[c];
+    for (int c = 0; c < 3; ++c) variance[c] += other.variance[c];
+    for (int c = 0; c < 3; ++c) count[c] += other.count[c];
   }
 };
 
@@ -74,6 +77,7 @@ struct Memory {
         moved(share.width(), share.height()),
         steps(share.width() / area_step, share.height()),
         offset(steps.width(), rounded_up(share.height(), area_step) / area_step),
+        step_of_site(share.width() / area_blocks * (rounded_up(share.height(), area_blocks) / area_blocks), 3),
         motion(largest_width, largest_height),
         next_mean_e(mean_e.width(), mean_e.height()),
         next_share(share.width(), share.height()),
@@ -101,6 +105,7 @@ struct Memory {
   Plane<std::uint8_t> moved;
   Plane<AreaSums> steps;  // of area_step blocks side by side
   Plane<float> offset;    // of each area: mean square of its difference from the mean, over the variance of raw values
+  Plane<float> step_of_site;  // of R, G, B: mean difference over its variance, of areas that do not overlap
   FrameMotion motion;
   Plane<float> next_mean_e;  // mean and shares that follow, while the previous ones are displaced
   Plane<float> next_share;
@@ -137,7 +142,9 @@ struct Frame {
   void displace(const Workers& workers, bool same) const;
   void find(int y, const MotionThresholds& at, StripMemory& strip) const;
   bool has_moved(int x, int y) const;
-  float offset_of_area(int x, int y, double threshold) const;
+  AreaSums sums_of_area(int x, int y) const;
+  std::array<float, 3> common_step(const Workers& workers) const;
+  float offset_of_area(int x, int y, const std::array<float, 3>& common, double threshold) const;
   void add_offsets(int y) const;
   long long update(int y, PlaneView<float> out, StripMemory& strip) const;
   void put_fractions(int y, PlaneView<float> map) const;
@@ -249,6 +256,7 @@ void Frame::find(int y, const MotionThresholds& at, StripMemory& strip) const {
       for (int c = 0; c < 3; ++c) {
         out.sum[c] = steps.sum[c][b] + steps.sum[c][b + 1];
         out.variance[c] = steps.variance[c][b] + steps.variance[c][b + 1];
+        out.count[c] = steps.count[c][b] + steps.count[c][b + 1];
       }
     }
     // Blocks without content start anew, and say nothing of their neighbours.
@@ -258,29 +266,67 @@ void Frame::find(int y, const MotionThresholds& at, StripMemory& strip) const {
   }
 }
 
-/// Returns the mean square by which an area differs from the mean, over the variance of raw values; 0 where noise
-/// explains it.
 /// @param x, y  of the area, in steps
-float Frame::offset_of_area(int x, int y, double threshold) const {
+AreaSums Frame::sums_of_area(int x, int y) const {
   const int left = area_step * x, top = area_step * y;
   const int right = std::min(left + area_blocks, columns), bottom = std::min(top + area_blocks, rows);
   AreaSums all;
   for (int v = top; v < bottom; ++v) {
     for (int u = x; area_step * u < right; ++u) all.add(memory.steps.at(u, v));
   }
-  double step = 0, colours = 0;
-  for (int c = 0; c < 3; ++c) {
-    if (all.variance[c] <= 0) continue;
-    step += static_cast<double>(all.sum[c]) * static_cast<double>(all.sum[c]) / static_cast<double>(all.variance[c]);
-    colours += 1;
-  }
-  if (step <= threshold) return 0;
-  const int width = std::min(motion_block * right, raw.value.width) - motion_block * left;
-  const int height = std::min(motion_block * bottom, raw.value.height) - motion_block * top;
-  return static_cast<float>((step - colours) / (width * height));
+  return all;
 }
 
-/// Adds to the mean's variance ratios of a row of blocks the largest offset of the areas that have the block.
+/// Returns for R, G, B by how much the frame as a whole differs from the mean, over the variance, at a site: the median
+/// over areas, which parts that move hardly change.
+std::array<float, 3> Frame::common_step(const Workers& workers) const {
+  constexpr int steps = area_blocks / area_step;
+  const int across = rounded_up(columns, area_blocks) / area_blocks, down = rounded_up(rows, area_blocks) / area_blocks;
+  in_bands(workers, down, [&](int top, int bottom, int) {
+    for (int y = top; y < bottom; ++y) {
+      for (int x = 0; x < across; ++x) {
+        const AreaSums all = sums_of_area(steps * x, steps * y);
+        for (int c = 0; c < 3; ++c) {
+          const bool any = all.variance[c] > 0;
+          memory.step_of_site.at(across * y + x, c) = any ? all.sum[c] / all.count[c] : no_step;
+        }
+      }
+    }
+  });
+  std::array<float, 3> out{};
+  in_bands(workers, 3, [&](int first_colour, int end, int) {
+    for (int c = first_colour; c < end; ++c) {
+      float* const first_step = memory.step_of_site.row(c);
+      float* const last_step = std::remove(first_step, first_step + across * down, no_step);
+      if (first_step == last_step) continue;
+      float* const middle = first_step + (last_step - first_step) / 2;
+      std::nth_element(first_step, middle, last_step);
+      out[c] = *middle;
+    }
+  });
+  return out;
+}
+
+/// Returns the mean square by which an area differs from the mean, over the variance of raw values; 0 where noise
+/// explains it.
+/// @param x, y  of the area, in steps
+/// @param common  difference of the frame as a whole, from common_step()
+float Frame::offset_of_area(int x, int y, const std::array<float, 3>& common, double threshold) const {
+  const AreaSums all = sums_of_area(x, y);
+  double step = 0, colours = 0, count = 0;
+  for (int c = 0; c < 3; ++c) {
+    if (all.variance[c] <= 0) continue;
+    const auto n = static_cast<double>(all.count[c]);
+    const double sum = static_cast<double>(all.sum[c]) - n * static_cast<double>(common[c]);
+    step += sum * sum / static_cast<double>(all.variance[c]);
+    colours += 1;
+    count += n;
+  }
+  return step > threshold ? static_cast<float>((step - colours) / count) : 0.0f;
+}
+
+/// Adds to the mean's variance ratios of a row of blocks the largest offset of the areas that have the block. Blocks
+/// that started anew are 1, and stay so: they have nothing of the mean that differed.
 void Frame::add_offsets(int y) const {
   const int area_y = y / area_step;
   for (int x = 0; x < columns; ++x) {
@@ -290,7 +336,7 @@ void Frame::add_offsets(int y) const {
       for (int u = std::max(area_x - 1, 0); u <= area_x; ++u) offset = std::max(offset, memory.offset.at(u, v));
     }
     float& share = new_share().at(x, y);
-    share = std::min(share + offset, FrameMotion::no_content);
+    if (share < 1) share = std::min(share + offset, FrameMotion::no_content);
   }
 }
 
@@ -393,10 +439,11 @@ void Frame::take_in(const Workers& workers, PlaneView<float> out, PlaneView<floa
   });
   if (first) return;
   const double threshold = chi3_threshold(at.alone);
+  const std::array<float, 3> common = common_step(workers);
   in_bands(workers, (rows + area_step - 1) / area_step, [&](int top, int bottom, int) {
     for (int y = top; y < bottom; ++y) {
       for (int x = 0; x < (columns + area_step - 1) / area_step; ++x) {
-        memory.offset.at(x, y) = offset_of_area(x, y, threshold);
+        memory.offset.at(x, y) = offset_of_area(x, y, common, threshold);
       }
     }
   });

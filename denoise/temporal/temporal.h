@@ -20,9 +20,9 @@ struct TemporalOptions {
 /// Blocks of 8 x 8 sites are compared with the mean of the previous frames. Those that differ by more than the noise
 /// model explains, and their neighbours at a lower threshold, start anew. In scenes that move, the mean is first
 /// displaced by what FrameMotion finds, if frames have at least FrameMotion::min_side pixels each way. Areas of 32 x 32
-/// sites that differ by less, but by more than their noise, count with a larger variance from then on. After n <=
-/// max_frames still frames of equal light the mean's variance is 1 / n of a raw value's; with more frames it falls to 1
-/// / (2 max_frames - 1).
+/// sites that differ by less, but by more than their noise from what the frame differs by as a whole, have a larger
+/// variance from then on. After n <= max_frames still frames of equal light the mean's variance is 1 / n of a raw
+/// value's; with more frames it falls to 1 / (2 max_frames - 1).
 ///
 /// Owns its memory, allocates only in the constructor, and processes one frame at a time. The result is bit-identical
 /// for every number of threads and every instruction set.

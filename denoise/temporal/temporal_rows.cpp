@@ -148,6 +148,7 @@ struct Statistics {
   VF step_variance;
   VF change[3];  // of R, G, B: sum of the differences over their variances without that of the mean
   VF weight[3];  // and the variance of this sum, in the same way
+  VF count[3];   // and the number of its sites
 };
 
 /// Returns the statistics of the blocks `first` and on.
@@ -156,16 +157,17 @@ HWY_INLINE Statistics statistics_of(const Sums& sums, int first, VF s) {
   const Floats f;
   const VF one = constant(1), scale = hn::Div(one, hn::Add(one, s)), fresh = hn::Mul(s, scale), less = hn::Sub(one, s);
   const VF sharp = hn::Mul(scale, hn::Add(less, hn::Mul(s, s)));  // (1 + s^3) / (1 + s)^2
-  VF change[3], weight[3];
+  VF change[3], weight[3], count[3];
   VF step = hn::Zero(f), colours = hn::Zero(f), sites = hn::Zero(f), poisson = hn::Zero(f), excess = hn::Zero(f);
   for (int c = 0; c < 3; ++c) {
     change[c] = of_blocks(sums, Sums::change + c, first), weight[c] = of_blocks(sums, Sums::weight + c, first);
-    const VF count = of_blocks(sums, Sums::count + c, first), own = of_blocks(sums, Sums::poisson + c, first);
-    const MF any = hn::Gt(count, hn::Zero(f));
-    const VF n = hn::Max(count, one);
+    count[c] = of_blocks(sums, Sums::count + c, first);
+    const VF own = of_blocks(sums, Sums::poisson + c, first);
+    const MF any = hn::Gt(count[c], hn::Zero(f));
+    const VF n = hn::Max(count[c], one);
     step = hn::Add(step, hn::Div(hn::Mul(change[c], change[c]), hn::IfThenElse(any, weight[c], one)));
     colours = hn::Add(colours, hn::IfThenElseZero(any, one));
-    sites = hn::Add(sites, count);
+    sites = hn::Add(sites, count[c]);
     poisson = hn::Add(poisson, own);
     excess = hn::Add(excess, hn::Div(own, hn::Mul(n, n)));
   }
@@ -181,7 +183,8 @@ HWY_INLINE Statistics statistics_of(const Sums& sums, int first, VF s) {
       colours,
       hn::Add(hn::Add(colours, colours), hn::Mul(sharp, excess)),
       {change[0], change[1], change[2]},
-      {weight[0], weight[1], weight[2]}};
+      {weight[0], weight[1], weight[2]},
+      {count[0], count[1], count[2]}};
 }
 
 HWY_INLINE MF moved_at(const Statistics& s, const Threshold& at) {
@@ -212,6 +215,7 @@ void FindMotion(const MotionStrip& in, std::uint8_t* moved, BlockSteps& steps) {
     for (int c = 0; c < 3; ++c) {
       store(hn::Mul(scale, s.change[c]), steps.sum[c] + b);
       store(hn::Mul(scale, s.weight[c]), steps.variance[c] + b);
+      store(hn::Mul(scale, s.count[c]), steps.count[c] + b);
     }
   }
   for (int b = 0; b < blocks_of_strip; ++b) moved[b] = static_cast<std::uint8_t>(level[b]);

@@ -39,11 +39,12 @@ struct MotionStrip {
   Threshold alone;
   Threshold beside;
 };
-/// For each block and R, G, B: the sum of the differences from the mean, each over its variance, and the variance of
-/// that sum; 0 for a block that moved.
+/// For each block and R, G, B: the sum of the differences from the mean, each over its variance, the variance of that
+/// sum, and the number of sites that count over 1 + share; 0 for a block that moved.
 struct BlockSteps {
   float sum[3][blocks_of_strip];
   float variance[3][blocks_of_strip];
+  float count[3][blocks_of_strip];
 };
 /// Compares a strip with the mean.
 /// @param moved  for each block: 2 if it moved, 1 if it counts as moved next to a block that moved, else 0

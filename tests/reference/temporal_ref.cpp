@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 namespace lowlux::reference {
 namespace {
@@ -112,43 +113,70 @@ int TemporalMean::level_of(const Now& now, int x, int y, const denoise::MotionTh
     return above(spread, mean, variance, t.z, 1) || above(step, colours, 2 * colours + excess, t.z, t.few);
   };
   Block& block = blocks_.at(x, y);
-  block.step.fill(0), block.step_variance.fill(0);
+  block.step.fill(0), block.step_variance.fill(0), block.sites.fill(0);
   if (moved(at.alone)) return 2;
-  for (std::size_t c = 0; c < 3; ++c)
-    block.step[c] = change[c] / (1 + s), block.step_variance[c] = weights[c] / (1 + s);
+  for (std::size_t c = 0; c < 3; ++c) {
+    block.step[c] = change[c] / (1 + s), block.step_variance[c] = weights[c] / (1 + s),
+    block.sites[c] = count[c] / (1 + s);
+  }
   return moved(at.beside) ? 1 : 0;
 }
 
-/// Adds to the shares what areas of 4 x 4 blocks, at every second block, differ by as a whole.
+/// Adds to the shares what areas of 4 x 4 blocks, at every second block, differ by from the frame as a whole.
 void TemporalMean::add_offsets(const denoise::MotionThreshold& at) {
-  const int columns = blocks_.width(), rows = blocks_.height(), width = mean_e.width(), height = mean_e.height();
+  const int columns = blocks_.width(), rows = blocks_.height();
+  const auto each_block = [&](int left, int top, const auto& work) {
+    for (int y = top; y < std::min(top + 4, rows); ++y) {
+      for (int x = left; x < std::min(left + 4, columns); ++x) work(x, y);
+    }
+  };
+  struct Sums {
+    std::array<double, 3> step{}, variance{}, sites{};
+  };
+  const auto sums_of = [&](int left, int top) {
+    Sums out;
+    each_block(left, top, [&](int x, int y) {
+      const Block& block = blocks_.at(x, y);
+      for (std::size_t c = 0; c < 3; ++c) {
+        out.step[c] += block.step[c], out.variance[c] += block.step_variance[c], out.sites[c] += block.sites[c];
+      }
+    });
+    return out;
+  };
+  std::array<std::vector<double>, 3> of_areas;
+  for (int top = 0; top < rows; top += 4) {
+    for (int left = 0; left < columns; left += 4) {
+      const Sums area = sums_of(left, top);
+      for (std::size_t c = 0; c < 3; ++c) {
+        if (area.sites[c] > 0) of_areas[c].push_back(area.step[c] / area.sites[c]);
+      }
+    }
+  }
+  std::array<double, 3> common{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::sort(of_areas[c].begin(), of_areas[c].end());
+    if (!of_areas[c].empty()) common[c] = of_areas[c][of_areas[c].size() / 2];
+  }
   Plane<double> offset(columns, rows);
   std::fill(offset.data(), offset.data() + offset.size(), 0.0);
   for (int top = 0; top < rows; top += 2) {
     for (int left = 0; left < columns; left += 2) {
-      const int right = std::min(left + 4, columns), bottom = std::min(top + 4, rows);
-      std::array<double, 3> sum{}, variance{};
-      const auto each_block = [&](const auto& work) {
-        for (int y = top; y < bottom; ++y) {
-          for (int x = left; x < right; ++x) work(x, y);
-        }
-      };
-      each_block([&](int x, int y) {
-        for (std::size_t c = 0; c < 3; ++c) {
-          sum[c] += blocks_.at(x, y).step[c], variance[c] += blocks_.at(x, y).step_variance[c];
-        }
-      });
-      double step = 0, colours = 0;
+      const Sums area = sums_of(left, top);
+      double step = 0, colours = 0, sites = 0;
       for (std::size_t c = 0; c < 3; ++c) {
-        if (variance[c] > 0) step += sum[c] * sum[c] / variance[c], colours += 1;
+        if (area.sites[c] == 0) continue;
+        step += std::pow(area.step[c] - area.sites[c] * common[c], 2) / area.variance[c];
+        colours += 1;
+        sites += area.sites[c];
       }
       if (!above(step, 3, 6, at.z, at.few)) continue;
-      const int sites = (std::min(side * right, width) - side * left) * (std::min(side * bottom, height) - side * top);
-      each_block([&](int x, int y) { offset.at(x, y) = std::max(offset.at(x, y), (step - colours) / sites); });
+      each_block(left, top,
+                 [&](int x, int y) { offset.at(x, y) = std::max(offset.at(x, y), (step - colours) / sites); });
     }
   }
   for (std::size_t i = 0; i < offset.size(); ++i) {
-    blocks_.data()[i].share = std::min(blocks_.data()[i].share + offset.data()[i], 1e6);
+    Block& block = blocks_.data()[i];
+    if (block.share < 1) block.share = std::min(block.share + offset.data()[i], 1e6);
   }
 }
 

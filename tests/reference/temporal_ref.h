@@ -23,7 +23,8 @@ class TemporalMean {
     double share = 1;
     int level = 2;                          // 2: moved; 1: moved if a neighbour has
     std::array<double, 3> step{};           // of each colour: sum of the differences over their variances,
-    std::array<double, 3> step_variance{};  // and the variance of this sum; 0 if the block moved
+    std::array<double, 3> step_variance{};  // the variance of this sum,
+    std::array<double, 3> sites{};          // and the sites that count over 1 + share; 0 if the block moved
   };
   struct Now;
   void rescale(const Now& now, double light, int x, int y);
