@@ -69,6 +69,7 @@ struct BlendSites {
   const float* level_e2;  // variance of the level's result, one for each cell
   float* signal_e;        // the level's result; every second sample
   int sites;
+  std::size_t colour;
   float dark_e;
   float variance_e2;
 
@@ -80,8 +81,9 @@ struct BlendSites {
 
 /// Sums over the sites of cells.
 struct CellSums {
-  std::array<float, strip_cells> squares{};  // of differences, less their expectation
-  std::array<float, strip_cells> differences{};
+  std::array<float, strip_cells> squares{};                     // of differences, less their expectation
+  std::array<std::array<float, strip_cells>, 3> differences{};  // of R, G, B
+  std::array<std::array<float, strip_cells>, 3> sites{};        // their number
 };
 
 /// Adds the differences to the sums of cells. The frame is in both results, so that the mean shares a part `share` of
@@ -89,7 +91,8 @@ struct CellSums {
 void add_detail(const BlendSites& in, CellSums& sums) {
   for (int i = 0; i < in.sites; ++i) {
     const float d = in.difference(i);
-    sums.differences[i] += d;
+    sums.differences[in.colour][i] += d;
+    sums.sites[in.colour][i] += 1;
     sums.squares[i] += d * d - in.mean_e2(i) - (1 - 2 * in.share[i]) * in.level_e2[i];
   }
 }
@@ -103,17 +106,22 @@ void blend_sites(const BlendSites& in, const float* detail_e2) {
   }
 }
 
-/// Replaces the sums of squares by the mean over the sites of their block without that of the mean difference, at least
-/// 0: a level keeps the means of blocks, so that what differs there has moved.
+/// Replaces the sums of squares by the mean over the sites of their block without those of the mean differences of
+/// colours, at least 0: a level keeps the means of blocks, so that what differs there has moved.
 /// @param columns  of sites
 void average_blocks(CellSums& sums, int columns, int rows) {
   constexpr int block = 2 * block_cells;
   for (int x = 0; x < columns; x += block) {
     const int first = x / 2, sites = std::min(block, columns - x), last = first + (sites + 1) / 2;
     const auto count = static_cast<float>(sites * rows);
-    float squares = 0, differences = 0;
-    for (int i = first; i < last; ++i) squares += sums.squares[i], differences += sums.differences[i];
-    const float detail_e2 = std::max((squares - differences * differences / count) / count, 0.0f);
+    float squares = 0;
+    for (int i = first; i < last; ++i) squares += sums.squares[i];
+    for (int c = 0; c < 3; ++c) {
+      float difference = 0, of_colour = 0;
+      for (int i = first; i < last; ++i) difference += sums.differences[c][i], of_colour += sums.sites[c][i];
+      squares -= difference * difference / std::max(of_colour, 1.0f);
+    }
+    const float detail_e2 = std::max(squares / count, 0.0f);
     std::fill(sums.squares.begin() + first, sums.squares.begin() + last, detail_e2);
   }
 }
@@ -227,6 +235,7 @@ void NoiseReducer::blend(BayerPhase phase, const NoiseReduction& how, const deno
                       level.site_variance[colour].row(y / 2) + cell,
                       signal_e.row(y) + x,
                       std::min(strip_cells, (signal_e.width + 1 - x) / 2),
+                      colour,
                       static_cast<float>(how.noise.dark_mean_e[site_of(column, y)]),
                       static_cast<float>(how.noise.variance_e2[colour])};
   };

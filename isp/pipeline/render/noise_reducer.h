@@ -17,9 +17,9 @@ namespace lowlux::isp {
 ///
 /// Where a level and previous frames both take part, each site is a mean of the level's result and of the mean over
 /// frames. Its weights are those by inverse variances of the level's result and of the previous frames alone. The
-/// variance of the level includes the detail it has lost: what both results differ by beyond their noise, around its
-/// mean in blocks of 8 x 8 sites, and at most 4 times the variance of the level's noise, because something may have
-/// moved too little to be detected. denoise/README.md has the equations.
+/// variance of the level includes the detail it has lost: what both results differ by beyond their noise, around
+/// the means of its colours in blocks of 8 x 8 sites, and at most 4 times the variance of the level's noise,
+/// because something may have moved too little to be detected. denoise/README.md has the equations.
 class NoiseReducer {
  public:
   explicit NoiseReducer(Executor& executor) : executor_(executor) {}
