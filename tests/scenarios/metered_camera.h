@@ -48,6 +48,12 @@ struct MeteredCamera {
     return light * (1 + flicker_depth * ripple);
   }
 
+  /// Returns the largest light of frames of a given exposure, relative to `light`.
+  double peak(double exposure_s) const {
+    const double a = 3.14159265358979323846 * flicker_hz * exposure_s;
+    return 1 + flicker_depth * std::abs(std::sin(a) / a);
+  }
+
   /// Reads out one frame and lets the controller decide.
   void step(isp::ExposureController& controller, isp::ExposureMeter& meter) {
     const isp::ExposureSetting at = waiting.size() > static_cast<std::size_t>(latency) ? take_one() : waiting.front();

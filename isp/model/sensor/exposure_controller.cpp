@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <span>
 #include <utility>
 
 #include "isp/model/sensor/saturation_limits.h"
@@ -14,15 +13,14 @@ namespace {
 constexpr int decisive_frames = 4;                              // without flicker
 constexpr double other_light = 1.25, other_light_of_lamps = 3;  // ratio of highlights
 constexpr double new_tolerance = 0.01, held_tolerance = 0.03;   // loss of power for which a setting is not left
-constexpr double margin = 0.01;          // of the highlight, with which a better setting must be possible, too
-constexpr double flicker_range = 0.04;   // of the highlights of frames, relative, from which light flickers
-constexpr double sudden = 0.1;           // change between frames, of the peak, that slow aliases of flicker do not make
-constexpr int held_frames = 512;         // after which a peak that does not come back is forgotten
-constexpr double flicker_margin = 1.05;  // of the peak, that may be higher than it was seen
-constexpr double flicker_tolerance = 0.2;  // loss of power for which a short exposure is not left under flicker
-constexpr double long_tolerance = 0.5;     // the same for an exposure that averages flicker out
-constexpr double beyond_clipped = 1.4;     // assumed of a peak that clips although frames have shown the peak
-constexpr int most_changes = 2;            // of short exposures by frames that do not clip, without flicker
+constexpr double margin = 0.01;            // of the highlight, with which a better setting must be possible, too
+constexpr double even_range = 0.04;        // of the highlights of frames, relative, of a light that is steady
+constexpr double flicker_range = 0.08;     // by which highlights of frames both rise and fall where light flickers
+constexpr double same_peak = 0.8;          // of the peak, that the largest of 12 frames of the same flicker reaches
+constexpr double flicker_margin = 1.05;    // of the peak, that may be higher than it was seen
+constexpr double flicker_tolerance = 0.2;  // loss of power for which a setting is not left under flicker
+constexpr double long_tolerance = 0.5;     // the same for leaving a flicker-free exposure for one that shows flicker
+constexpr double beyond_white = 1.2;       // assumed of a peak that clips although another frame did not
 constexpr double as_stated = 0.02;         // relative difference up to which a frame has the setting that was made
 constexpr double near_white = 0.995;       // fraction of the range from which a highlight counts as clipped
 
@@ -54,8 +52,8 @@ ExposureController::ExposureController(Setup setup)
 void ExposureController::reset(const ExposureSetting& at) {
   setting_ = at;
   light_.reset();
-  flicker_ = {};
-  settled_ = false;
+  peak_e_per_s_.reset();
+  is_flicker_seen_ = settled_ = false;
   count_ = await_frames_ = 0;
 }
 
@@ -113,57 +111,54 @@ bool ExposureController::is_short(double exposure_s) const {
 bool ExposureController::is_other_light(const Metered& frame, const GainStep& gain) const {
   if (!light_ || frame.clips) return true;
   const bool may_flicker = is_short(frame.exposure_s);
-  if (may_flicker && flicker_.is_known) return false;  // darker frames are troughs until a whole mean is dark
+  if (may_flicker && peak_e_per_s_) return false;  // a darker frame is a trough unless 12 are dark
   const double mean_e = (light_->highlight_e_per_s + dark_e_per_s(gain, limits_)) * frame.exposure_s;
   const double expected_e = exceeded_e(mean_e, noise_e(gain.sensor), normal_quantile_above(limits_.clipped_fraction));
-  const double limit = may_flicker || flicker_.is_known ? other_light_of_lamps : other_light;
+  const double limit = may_flicker || is_flicker_seen_ ? other_light_of_lamps : other_light;
   return frame.highlight_e > limit * expected_e || frame.highlight_e * limit < expected_e;
 }
 
-/// Returns the light by the frames since the last setting: means, but the largest highlight of a light that flickers.
-/// A peak is forgotten after a sudden change to steady light, where light stays far below it, and where it does not
-/// come back; the trough of a slow alias of flicker, which is steady too, is reached without a sudden change.
+/// Returns the light by the frames since the last setting: means, but the largest highlight of a light that changes,
+/// and the largest since its peak was known of one that flickers. Light that only rises or only falls does not flicker.
 MeteredLight ExposureController::light_of_frames(bool may_flicker) {
-  const auto frames = std::span(frames_).first(std::min(static_cast<std::size_t>(count_), frames_.size()));
+  const std::size_t count = std::min(static_cast<std::size_t>(count_), frames_.size());
   MeteredLight out;
-  double least = frames[0].highlight_e_per_s, most = least;
-  for (const MeteredLight& frame : frames) {
-    out.midtone_e_per_s += frame.midtone_e_per_s / static_cast<double>(frames.size());
-    out.highlight_e_per_s += frame.highlight_e_per_s / static_cast<double>(frames.size());
+  double least = frames_[static_cast<std::size_t>(count_) % count].highlight_e_per_s, most = least, rise = 0, fall = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const MeteredLight& frame = frames_[(static_cast<std::size_t>(count_) + i) % count];  // from the earliest on
+    out.midtone_e_per_s += frame.midtone_e_per_s / static_cast<double>(count);
+    out.highlight_e_per_s += frame.highlight_e_per_s / static_cast<double>(count);
     least = std::min(least, frame.highlight_e_per_s);
     most = std::max(most, frame.highlight_e_per_s);
-  }
-  const bool is_full = frames.size() == frames_.size(), is_even = most - least <= flicker_range * out.highlight_e_per_s;
-  const bool is_sudden = is_even && steady_ == static_cast<int>(frames_.size());
-  if (is_full && (is_sudden || since_peak_ > held_frames || other_light_of_lamps * most < flicker_.peak_e_per_s)) {
-    flicker_ = {};
-  } else if (is_full && is_even && (is_short(setting_.exposure_s) || !flicker_.is_seen) &&
-             most > (1 - flicker_range) * flicker_.peak_e_per_s) {
-    flicker_.is_known = false;
+    rise = std::max(rise, frame.highlight_e_per_s - least);
+    fall = std::max(fall, most - frame.highlight_e_per_s);
   }
   if (!may_flicker) return out;
-  if (!is_even) {
-    flicker_.is_known = true;
-    flicker_.is_seen = flicker_.is_seen || is_short(setting_.exposure_s);
-    flicker_.peak_e_per_s = std::max(most, flicker_.peak_e_per_s);
+  const bool is_full = count == frames_.size(), is_even = most - least <= even_range * out.highlight_e_per_s;
+  if (is_full && is_even) is_flicker_seen_ = false;
+  if (is_full && (is_even || most < same_peak * peak_e_per_s_.value_or(0))) peak_e_per_s_.reset();
+  if (std::min(rise, fall) > flicker_range * out.highlight_e_per_s) {
+    is_flicker_seen_ = true;
+    peak_e_per_s_ = peak_e_per_s_.value_or(0);
   }
-  out.highlight_e_per_s = std::max(flicker_.peak_e_per_s, out.highlight_e_per_s);
+  if (peak_e_per_s_) peak_e_per_s_ = std::max(most, *peak_e_per_s_);
+  if (!is_even) out.highlight_e_per_s = most;
+  out.highlight_e_per_s = peak_e_per_s_.value_or(out.highlight_e_per_s);
   return out;
 }
 
 /// Returns whether the setting need not be left. One that has held for all frames of the mean is left only for one that
 /// a slightly brighter highlight allows as well.
 bool ExposureController::may_stay() const {
-  if (flicker_.is_seen && !is_short(setting_.exposure_s))
-    return is_good(setting_, *light_, gains_, limits_, choice_, long_tolerance);
-  if (may_vary()) return is_good(setting_, *light_, gains_, limits_, choice_, flicker_tolerance);
+  const auto is_good_to = [&](const ExposureChoice& best, double tolerance) {
+    return is_good(setting_, *light_, gains_, limits_, best, tolerance);
+  };
+  const bool would_flicker = is_short(choice_.setting.exposure_s) && !is_short(setting_.exposure_s);
+  if (is_flicker_seen_ && would_flicker) return is_good_to(choice_, long_tolerance);
+  if (peak_e_per_s_) return is_good_to(choice_, flicker_tolerance);
   const bool is_held = count_ > static_cast<int>(frames_.size());
-  if (!is_held) return is_good(setting_, *light_, gains_, limits_, choice_, new_tolerance);
-  return is_good(setting_, *light_, gains_, limits_, choice_of(1 + margin), held_tolerance);
+  return is_held ? is_good_to(choice_of(1 + margin), held_tolerance) : is_good_to(choice_, new_tolerance);
 }
-
-/// Returns whether the light flickers, or settings change the light so often that it must.
-bool ExposureController::may_vary() const { return flicker_.is_known || flicker_.changes >= most_changes; }
 
 ExposureChoice ExposureController::choice_of(double brightness) const {
   MeteredLight brighter = *light_;
@@ -171,25 +166,16 @@ ExposureChoice ExposureController::choice_of(double brightness) const {
   return choose_exposure(brighter, gains_, limits_);
 }
 
-/// Updates what is known of flicker by a frame. One that clips although frames have shown the peak missed it by little.
-void ExposureController::follow_flicker(Metered& frame, bool other, bool may_flicker) {
-  if (limits_.mains == Mains::off || (other && !frame.clips)) flicker_ = {};
-  if (!is_short(frame.exposure_s)) flicker_.changes = 0;
-  if (!may_flicker && !flicker_.is_seen) flicker_.is_known = false;
-  double& highlight = frame.light.highlight_e_per_s;
+/// Updates what is known of flicker by a frame. Light that clips may be the peak of a flicker.
+void ExposureController::follow_flicker(Metered& frame, bool other) {
   if (frame.clips && limits_.mains != Mains::off) {
-    const bool is_missed = may_vary() && count_ >= static_cast<int>(frames_.size());
-    flicker_.is_known = true;
-    flicker_.clipped_e_per_s =
-        std::max(flicker_.clipped_e_per_s, (is_missed ? beyond_clipped : 1) * frame.white_e_per_s);
-    flicker_.peak_e_per_s = flicker_.clipped_e_per_s;
-    if (is_missed) highlight = flicker_.peak_e_per_s;
+    const bool is_missed = peak_e_per_s_ && count_ > 0;  // frames of this setting did not clip
+    peak_e_per_s_ = std::max(peak_e_per_s_.value_or(0), (is_missed ? beyond_white : 1) * frame.white_e_per_s);
+    if (is_missed) frame.light.highlight_e_per_s = *peak_e_per_s_;
+  } else if (other || !is_short(frame.exposure_s)) {
+    peak_e_per_s_.reset();
+    is_flicker_seen_ = is_flicker_seen_ && !other;
   }
-  const double peak = std::max(flicker_.peak_e_per_s, highlight);
-  const double last = frames_[static_cast<std::size_t>(count_ + frames_.size() - 1) % frames_.size()].highlight_e_per_s;
-  steady_ = count_ > 0 && std::abs(highlight - last) > sudden * peak ? 1 : steady_ + 1;
-  if (steady_ == 1) flicker_.changes = 0;
-  since_peak_ = highlight > (1 - flicker_range) * peak ? 0 : since_peak_ + 1;
 }
 
 std::optional<ExposureSetting> ExposureController::take(const MeteredCodes& codes,
@@ -199,24 +185,22 @@ std::optional<ExposureSetting> ExposureController::take(const MeteredCodes& code
   for (GainStep& gain : gains_) gain.sensor.black_level_dn = gain.sensor.white_level_dn - codes.range_dn;
   const StatedExposure exposed = stated.value_or(StatedExposure{setting_.exposure_s, gains_[setting_.gain].factor});
   Metered frame = metered(codes, exposed);
-  const bool may_flicker = is_short(exposed.exposure_s) || limits_.mains == Mains::either;
+  const bool may_flicker = is_short(exposed.exposure_s);
   const bool other = is_other_light(frame, gains_[gain_near(exposed.gain_factor)]);
-  follow_flicker(frame, other, may_flicker);
+  follow_flicker(frame, other);
   if (other) count_ = 0;
   frames_[static_cast<std::size_t>(count_) % frames_.size()] = frame.light;
   count_ = count_ == 2 * static_cast<int>(frames_.size()) - 1 ? static_cast<int>(frames_.size()) : count_ + 1;
   if (other) settled_ = false;
-  if (!other && count_ < (is_short(exposed.exposure_s) ? static_cast<int>(frames_.size()) : decisive_frames))
-    return std::nullopt;
+  if (!other && count_ < (may_flicker ? static_cast<int>(frames_.size()) : decisive_frames)) return std::nullopt;
   light_ = light_of_frames(may_flicker);
-  choice_ = choice_of(may_vary() && !frame.clips ? flicker_margin : 1);
+  choice_ = choice_of(peak_e_per_s_ && !frame.clips ? flicker_margin : 1);
   if (may_stay()) {
     settled_ = !frame.clips || choice_.clips;
     return std::nullopt;
   }
   setting_ = choice_.setting;
-  flicker_.peak_e_per_s = flicker_.clipped_e_per_s;  // longer exposures flicker less
-  if (!frame.clips) ++flicker_.changes;
+  if (peak_e_per_s_ && !frame.clips) peak_e_per_s_ = 0;  // another exposure sees another peak
   settled_ = false;
   count_ = 0;  // the frames of the new setting replace those that led to it
   await_frames_ = latency_frames_;

@@ -27,11 +27,14 @@ struct StatedExposure {
 /// the last 12 frames, or fewer since the last setting. A frame whose highlight clips, or differs by more than a
 /// fourth, is a change of light and is followed at once; otherwise a setting is left after four frames at the earliest,
 /// and only where it loses 1 % of the power of the signal-to-noise ratio, after 12 frames 3 %, so that noise moves
-/// nothing. Exposures shorter than half a period of the mains show flicker: where that moves the highlight of 12 frames
-/// by more than 4 %, its largest value counts, and so does the largest that clipped, until the light changes suddenly,
-/// stays below a third of it for 12 frames, or does not come back to it in 512 frames. Under flicker the peak has 5 %
-/// more room, and a setting is left only where it loses 20 % of the power; a flicker-free one, 50 %. Frames between a
-/// setting and its effect are left out. Allocates nothing after construction.
+/// nothing.
+///
+/// Exposures shorter than half a period of the mains show flicker. They are left after 12 frames at the earliest, and
+/// where those differ by more than 4 % their largest highlight counts. Light flickers where the highlight of 12 frames
+/// both rises and falls by more than 8 % of its mean, which slow changes do not, and may flicker after it clipped. Its
+/// peak is then held, with 5 % more room, until 12 frames differ by at most 4 % or stay below 0.8 of it; a darker frame
+/// is a trough, and a setting is left only where it loses 20 % of the power, a flicker-free one for a short one 50 %.
+/// Frames between a setting and its effect are left out. Allocates nothing after construction.
 class ExposureController {
  public:
   struct Setup {
@@ -74,21 +77,13 @@ class ExposureController {
     double white_e_per_s = 0;  // that would fill the range
     double exposure_s = 0;
   };
-  struct Flicker {
-    bool is_known = false;       // frames differ, or one clipped
-    bool is_seen = false;        // frames of a short exposure differ
-    double peak_e_per_s = 0;     // largest highlight at this setting, or that clipped at any
-    double clipped_e_per_s = 0;  // largest highlight that is known to clip
-    int changes = 0;             // of short exposures since the light changed, by frames that do not clip
-  };
   bool is_awaited(const std::optional<StatedExposure>& stated);
   Metered metered(const MeteredCodes& codes, const StatedExposure& exposed) const;
   bool is_short(double exposure_s) const;
-  void follow_flicker(Metered& frame, bool other, bool may_flicker);
+  void follow_flicker(Metered& frame, bool other);
   bool is_other_light(const Metered& frame, const GainStep& gain) const;
   MeteredLight light_of_frames(bool may_flicker);
   bool may_stay() const;
-  bool may_vary() const;
   ExposureChoice choice_of(double brightness) const;
 
   std::vector<GainStep> gains_;
@@ -99,9 +94,8 @@ class ExposureController {
   std::array<MeteredLight, 12> frames_{};  // the last ones, in turn
   int count_ = 0;                          // frames since the last setting, or since the light changed
   std::optional<MeteredLight> light_;      // by which the last decision was made
-  Flicker flicker_;
-  int steady_ = 0;      // frames since the highlight changed suddenly
-  int since_peak_ = 0;  // frames since the highlight was at its peak
+  std::optional<double> peak_e_per_s_;     // largest highlight of a light that flickers, or may as it clipped
+  bool is_flicker_seen_ = false;           // by a short exposure of this light
   bool settled_ = false;
   ExposureChoice choice_;
   int changes_ = 0;
