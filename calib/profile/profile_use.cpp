@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -78,6 +79,17 @@ double temperature_factor(const GainProfile& gain, const FrameInfo& info, double
   return std::exp2((celsius - sensor.dark_temperature_c) / sensor.dark_doubling_c);
 }
 
+/// Returns the relative error that the doubling figure adds to a dark current beyond the temperatures of the darks.
+/// Within them the currents are measured. The error of the nearest one is correlated with it: the two add up.
+double extrapolation_error(const GainProfile& gain, const FrameInfo& info) {
+  const SensorModel& sensor = *gain.sensor;
+  if (!info.temperature_c) return 0;
+  const MeasuredRange measured =
+      gain.dark_temperature_c.value_or(MeasuredRange{sensor.dark_temperature_c, sensor.dark_temperature_c});
+  const double beyond_c = std::max({measured.low - *info.temperature_c, *info.temperature_c - measured.high, 0.0});
+  return std::numbers::ln2 * beyond_c * gain.errors.dark_doubling_c / (sensor.dark_doubling_c * sensor.dark_doubling_c);
+}
+
 void warn_of_exposure(const GainProfile& gain, double exposure_s, bool scaled, std::vector<std::string>& warnings) {
   if (!gain.dark_exposure_s) return;
   const auto& [low, high] = *gain.dark_exposure_s;
@@ -112,6 +124,7 @@ Result<PerSite<double>> find_dark_charge(const GainProfile& gain, const RawDn& f
   if (fastest * factor * time_s > telling_charge_e) warn_of_exposure(gain, time_s, true, out.warnings);
   for (double& current : sensor.dark_current_e_per_s) current *= factor;
   if (frame.info.temperature_c) sensor.dark_temperature_c = *frame.info.temperature_c;
+  const double beyond = extrapolation_error(gain, frame.info);
   PerSite<double> errors{};
   for (int site = 0; site < 4; ++site) {
     const int k = channel_of(frame, site);
@@ -119,7 +132,8 @@ Result<PerSite<double>> find_dark_charge(const GainProfile& gain, const RawDn& f
     // Codes are subtracted: the system gain's error is in the current, and cancels.
     const double of_gain = gain.errors.system_gain_dn_per_e / gain.sensor->system_gain_dn_per_e;
     const double all = gain.errors.dark_current_e_per_s[k], shared = of_gain * gain.sensor->dark_current_e_per_s[k];
-    errors[site] = std::sqrt(std::max(0.0, all * all - shared * shared)) * factor * time_s;
+    errors[site] =
+        std::sqrt(std::max(0.0, all * all - shared * shared)) * factor * time_s + beyond * out.dark_mean_e[site];
   }
   return errors;
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <numbers>
 #include <random>
 #include <string>
 
@@ -68,6 +70,39 @@ TEST(ProfileUse, AddsDarkChargeOfTheExposureAndTemperature) {
   EXPECT_EQ(found->black->holds, BlackPoint::Holds::pedestal_and_dark);
   EXPECT_EQ(found->black->source, BlackPoint::Source::profile);
   EXPECT_NEAR(found->sensor->dark_current_e_per_s[2], 12, 1e-12);
+}
+
+// Two currents with independent errors, measured at two temperatures, state the doubling. Beyond them the standard
+// error of the black level is that of the line through their logarithms, or up to 1.09 times as large.
+TEST(ProfileUse, TheErrorOfTheDoublingCountsBeyondTheTemperaturesOfTheDarks) {
+  constexpr unsigned seed = 20261128;
+  std::mt19937_64 engine(seed);
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(engine); };
+  for (int i = 0; i < 200; ++i) {
+    const double low_c = uniform(-20, 40), apart_c = uniform(1, 20), relative_error = std::pow(10, uniform(-4, -1));
+    GainProfile gain = gain_at(100, 1, 4, 500);
+    SensorModel& sensor = *gain.sensor;
+    sensor.dark_temperature_c = low_c + apart_c;
+    sensor.dark_doubling_c = uniform(4, 12);
+    for (std::size_t k = 0; k < 3; ++k) {
+      gain.errors.dark_current_e_per_s[k] = relative_error * sensor.dark_current_e_per_s[k];
+    }
+    const double slope_error = std::numbers::sqrt2 * relative_error / apart_c;  // of the logarithm, per degree
+    gain.errors.dark_doubling_c = slope_error * sensor.dark_doubling_c * sensor.dark_doubling_c / std::numbers::ln2;
+    gain.dark_temperature_c = MeasuredRange{low_c, low_c + apart_c};
+    for (const bool is_warmer : {true, false}) {
+      const double beyond = uniform(0, 3);  // distances of the two temperatures
+      const double celsius = is_warmer ? low_c + (1 + beyond) * apart_c : low_c - beyond * apart_c;
+      const auto found = profile_at({"M", "C", {gain}, {}}, frame(100, 5, celsius));
+      ASSERT_TRUE(found);
+      const double line_error = relative_error * std::hypot(1 + beyond, beyond);
+      const double stated = found->black->pedestal_standard_error_dn[0], charge = found->dark_mean_e[0];
+      const double of_charge = std::sqrt(stated * stated - 0.3 * 0.3) / charge;
+      if (line_error * charge < 0.01) continue;                                       // DN, next to 0.3 of the pedestal
+      EXPECT_GT(of_charge / line_error, 0.999) << "seed " << seed << ", draw " << i;  // roundings
+      EXPECT_LT(of_charge / line_error, 1.09) << "seed " << seed << ", draw " << i;
+    }
+  }
 }
 
 TEST(ProfileUse, NoiseIsTheSensorsInSharesOfTheRange) {
