@@ -82,7 +82,7 @@ TEST_F(Advise, SaysGainExposureAndWhyAndLeavesTheCurveToTheReport) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_TRUE(holds(result.out, "advice            ISO 6400, 1/20 s: SNR 12.8 dB")) << result.out;
   EXPECT_LT(std::count(result.out.begin(), result.out.end(), '\n'), 30) << result.out;
-  EXPECT_TRUE(holds(result.out, "because         motion limits the exposure to 0.05 s")) << result.out;
+  EXPECT_TRUE(holds(result.out, "because         the longest exposure allowed is 0.05 s")) << result.out;
   EXPECT_TRUE(holds(result.out, "mid tone 0.05 cd/m2, highlight 1 cd/m2, at most 0.05 s, 20 C")) << result.out;
   EXPECT_TRUE(holds(result.out, "row and column noise of")) << result.out;
   EXPECT_TRUE(holds(result.out, "curves over exposure time")) << result.out;

@@ -23,7 +23,7 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double heavy_tails = 5;  // see isp::ChromaPrecision::weight_snr
 
 const char* limit_name(isp::ExposureLimit limit) {
-  static constexpr const char* names[] = {"motion", "converter range", "full well"};
+  static constexpr const char* names[] = {"longest exposure", "converter range", "full well"};
   return names[static_cast<int>(limit)];
 }
 

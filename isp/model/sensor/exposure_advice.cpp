@@ -248,7 +248,7 @@ std::string limit_text(const AdviceRequest& r, const ExposureAdvice& advice) {
   const std::string time = text_of(best.at.exposure_s) + " s";
   switch (best.limit) {
     case ExposureLimit::motion:
-      return "motion limits the exposure to " + time;
+      return "the longest exposure allowed is " + time;
     case ExposureLimit::converter_range:
       return "the highlight reaches the converter's largest code at " + r.gains[advice.best].name + " after " + time;
     case ExposureLimit::full_well:

@@ -56,7 +56,7 @@ TEST(ExposureAdvice, InTheDarkMotionLimitsAndTheGainIsTheLowestAtWhichReadNoiseI
   EXPECT_EQ(best.largest_noise, NoiseSource::read_noise);
   // 1 e- of signal in green: 2.56 of 1 + 0.02 + 2.56 + 1 / (12 4.8^2)
   EXPECT_NEAR(best.largest_noise_fraction, 2.56 / (3.58 + 1 / (12 * 4.8 * 4.8)), 1e-12);
-  EXPECT_TRUE(holds(advice->reason, "motion limits the exposure to 0.02 s")) << advice->reason;
+  EXPECT_TRUE(holds(advice->reason, "the longest exposure allowed is 0.02 s")) << advice->reason;
   EXPECT_TRUE(holds(advice->reason, "above ISO 1600 noise no longer falls by 0.1 dB")) << advice->reason;
   EXPECT_TRUE(holds(advice->reason, "read noise is 71.4 % of the variance")) << advice->reason;
 }
