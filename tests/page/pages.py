@@ -3,8 +3,9 @@ import os
 import re
 import subprocess
 
-CAMERA = ["--sensor", "ELD_NikonD850", "--gain", "ISO 1600", "--system-gain", "0.5", "--read-noise", "2",
-          "--full-well", "20000", "--dark-current", "20,30,25", "--no-truth", "--quiet", "--effects", "all"]
+CAMERA = ["--sensor", "ELD_NikonD850", "--gain", "ISO 1600", "--iso", "1600", "--system-gain", "0.5",
+          "--read-noise", "2", "--full-well", "20000", "--dark-current", "20,30,25", "--no-truth", "--quiet",
+          "--effects", "all"]
 
 
 class Pages:

@@ -123,6 +123,19 @@ void take_electronics(NamedSensor& out, int row, const SensorFigures& given) {
       given.quantisation.value_or(out.model.name == thesis_sensor ? Quantisation::floor : Quantisation::round);
 }
 
+/// Returns the electronics that the table states, completed by given figures only where it has none.
+SensorModel published_electronics(std::string_view name, int row, const SensorFigures& given) {
+  const TextTable& t = sensors();
+  SensorFigures missing;
+  if (!t.number(row, "bits")) missing.bits = given.bits;
+  if (!t.number(row, "conversion_gain_DN_per_e")) missing.system_gain_dn_per_e = given.system_gain_dn_per_e;
+  if (!t.number(row, "read_noise_e")) missing.read_noise_e = given.read_noise_e;
+  NamedSensor out;
+  out.model.name = name;
+  take_electronics(out, row, missing);
+  return out.model;
+}
+
 void take_dark_current(NamedSensor& out, int row, const SensorFigures& given) {
   const TextTable& t = sensors();
   SensorModel& m = out.model;
@@ -274,6 +287,7 @@ Result<NamedSensor> sensor_named(std::string_view name, std::string_view gain, c
   out.iso_given = figures.iso.has_value();
   out.iso = out.iso_given ? figures.iso : iso_of(out.gain_setting);
   take_electronics(out, *row, figures);
+  out.published = published_electronics(name, *row, figures);
   take_dark_current(out, *row, figures);
   take_fixed_pattern(out, figures);
   take_camera(out, figures);

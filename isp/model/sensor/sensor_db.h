@@ -51,8 +51,11 @@ struct NamedSensor {
   std::string camera;        // camera whose spectral sensitivities are used, see camera_sensitivity()
   std::optional<double> pixel_pitch_um;
   std::optional<double> peak_quantum_efficiency;
-  std::optional<double> iso;             // speed of the gain setting
-  bool iso_given = false;                // by the user: it takes precedence over pitch and efficiency
+  std::optional<double> iso;  // speed of the gain setting
+  bool iso_given = false;     // by the user: it takes precedence over pitch and efficiency
+  /// Electronics of the table alone, of which a speed of the table holds; nullopt: those of `model`. Figures that a
+  /// user gives in their place change the charge that saturates the sensor, not the electrons that light causes.
+  std::optional<SensorModel> published;
   std::vector<std::string> assumptions;  // one line each: a figure no source gives, and the value used instead
   bool black_level_is_sourced = false;   // by the table or the user
 };

@@ -87,17 +87,19 @@ Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Opti
   for (Spectrum& channel : *efficiency) channel = channel.mapped([&](double, double value) { return peak * value; });
   SpectralResponse out{sensor.model.name + " through the filters of " + sensor.camera, *std::move(efficiency), 0};
 
+  const SensorModel& published = sensor.published ? *sensor.published : sensor.model;
   const bool lens = sensor.pixel_pitch_um && sensor.peak_quantum_efficiency;
   const double n2 = optics.f_number * optics.f_number;
   if (optics.white_luminance_cd_m2) {
     out.etendue_m2_sr = etendue_for(out, *optics.white_luminance_cd_m2, sensor.model.full_well_e);
   } else if (sensor.iso && (sensor.iso_given || !lens)) {
-    out.etendue_m2_sr = etendue_for(out, 78 * n2 / (0.65 * *sensor.iso), saturation_charge_e(sensor.model));
+    const double charge_e = saturation_charge_e(sensor.iso_given ? sensor.model : published);
+    out.etendue_m2_sr = etendue_for(out, 78 * n2 / (0.65 * *sensor.iso), charge_e);
   } else if (lens) {
     const double pitch_m = *sensor.pixel_pitch_um * 1e-6;
     out.etendue_m2_sr = pitch_m * pitch_m * std::numbers::pi / (4 * n2);
   } else if (sensor.model.name == thesis_sensor) {
-    out.etendue_m2_sr = etendue_for(out, thesis_white_luminance_cd_m2, sensor.model.full_well_e);
+    out.etendue_m2_sr = etendue_for(out, thesis_white_luminance_cd_m2, published.full_well_e);
   } else {
     return no_scale(sensor);
   }

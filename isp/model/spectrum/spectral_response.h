@@ -33,6 +33,7 @@ inline constexpr double assumed_peak_quantum_efficiency = 0.5;
 ///     (isp/model/sensor/scene_luminance.h); pixel pitch p and peak quantum efficiency: etendue = p^2 pi / (4 N^2) for
 ///     an ideal lens of f-number N; the ISO speed of the table's gain setting; thesis_white_luminance_cd_m2 for the
 ///     thesis' sensor.
+/// A speed that is given holds for the sensor as it is, the last two for NamedSensor::published.
 /// Errors: none of them is known (the message names what is missing); an unknown camera (near matches are offered); an
 /// f-number, luminance, pixel pitch or ISO speed that is not positive or far outside the possible range, used or not.
 Result<SpectralResponse> spectral_response(const NamedSensor& sensor, const Optics& optics);

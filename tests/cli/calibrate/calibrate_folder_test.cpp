@@ -23,7 +23,7 @@ class CalibrateFolder : public test::SimulateCommand {
  protected:
   void shoot(const std::string& scene, const std::string& name, const Words& more) {
     std::filesystem::create_directories(std::filesystem::path(file(name)).parent_path());
-    Words words{"--no-truth", "--effects", "all", "--dark-current", "20", "--full-well", "20000"};
+    Words words{"--no-truth", "--effects", "all", "--dark-current", "20", "--full-well", "20000", "--iso", "100"};
     words.insert(words.end(), more.begin(), more.end());
     simulated(scene, name, words);
   }

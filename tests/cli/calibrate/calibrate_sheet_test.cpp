@@ -40,6 +40,8 @@ class DataSheetCommand : public testing::Test {
                               "ELD_NikonD850",
                               "--gain",
                               "ISO 1600",
+                              "--iso",
+                              "1600",
                               "--system-gain",
                               "0.5",
                               "--read-noise",

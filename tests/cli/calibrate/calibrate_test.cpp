@@ -30,7 +30,8 @@ class Calibrate : public testing::Test {
   std::string file(const std::string& name) const { return scratch_.file(name); }
   bool exists(const std::string& name) const { return scratch_.holds(name); }
 
-  /// Frames NAME_0000.dng..., 0.5 DN/e-, 2 e- of read noise, 20 e-/s of dark current at 20 C.
+  /// Frames NAME_0000.dng..., 0.5 DN/e-, 2 e- of read noise, 20 e-/s of dark current at 20 C; ISO 1600 if not in
+  /// `more`.
   Words shoot(const std::string& name, const std::string& scene, const std::string& time_s, int frames,
               const Words& more = {}, const std::string& size = "128x128") {
     Words words{"simulate",
@@ -64,6 +65,7 @@ class Calibrate : public testing::Test {
                 "--seed",
                 std::to_string(++seed_)};
     words.insert(words.end(), more.begin(), more.end());
+    if (std::ranges::find(more, "--iso") == more.end()) words.insert(words.end(), {"--iso", "1600"});
     const auto done = lowlux(words);
     EXPECT_EQ(done.exit_code, 0) << done.err;
     Words out;

@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
 #include <string>
+#include <string_view>
 
 #include "isp/model/sensor/noise_budget.h"
 #include "isp/model/sensor/photon.h"
@@ -92,6 +94,43 @@ TEST(SpectralResponse, ASpeedThatIsGivenComesBeforePitchAndEfficiencyOneOfTheTab
   thesis.iso_given = true;
   EXPECT_NEAR(saturation_luminance_cd_m2(thesis.model, *spectral_response(thesis, {}), 1) / (78 * 4 / (0.65 * 200)), 1,
               1e-12);
+}
+
+/// Draws figures of a possible converter and pixel, each of them given or not.
+SensorFigures draw_electronics(std::mt19937& random) {
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
+  const auto is_given = [&] { return random() % 2 == 0; };
+  SensorFigures out;
+  const int bits = 8 + static_cast<int>(random() % 9);
+  if (is_given()) out.bits = bits;
+  if (is_given()) out.system_gain_dn_per_e = std::exp(uniform(-4, 3));
+  if (is_given()) out.full_well_e = std::exp(uniform(5, 12));
+  if (is_given()) out.black_level_dn = std::floor(uniform(0, 100));
+  if (out.black_level_dn && is_given()) out.white_level_dn = std::floor(uniform(150, 255));
+  if (is_given()) out.read_noise_e = uniform(0.5, 30);
+  return out;
+}
+
+TEST(SpectralResponse, FiguresOfPixelAndConverterDoNotChangeTheElectronsOfLight) {
+  const Spectrum white = *radiance_of(*light_named("D65"), 1);
+  for (const std::string_view name : {"ELD_NikonD850", "ELD_SonyA7S2", "ELD_CanonEOS700D", "thesis", "QSI_532"}) {
+    for (const std::string_view gain : gain_settings(name)) {
+      const double published = largest(electron_rate(*spectral_response(*sensor_named(name, gain, {}), {}), white));
+      for (unsigned seed = 0; seed < 20; ++seed) {
+        std::mt19937 random(seed);
+        SensorFigures given = draw_electronics(random);
+        NamedSensor sensor = *sensor_named(name, gain, given);
+        EXPECT_NEAR(largest(electron_rate(*spectral_response(sensor, {}), white)) / published, 1, 1e-12)
+            << name << ' ' << gain << ", seed " << seed;  // roundings
+        given.iso = 250;
+        sensor = *sensor_named(name, gain, given);
+        EXPECT_NEAR(
+            saturation_luminance_cd_m2(sensor.model, *spectral_response(sensor, {}), 1) / (78 * 4 / (0.65 * 250)), 1,
+            1e-12)
+            << name << ' ' << gain << ", seed " << seed << ": a speed that is given is that of these figures";
+      }
+    }
+  }
 }
 
 TEST(SpectralResponse, WithoutAScaleOnlyWhatIsMissingIsAskedFor) {
