@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <thread>
 
@@ -27,8 +28,12 @@ struct Simulated {
   std::vector<std::string> warnings;
 };
 
-Simulated simulated(const std::string& output, bool overwrite, const Words& words) {
+Simulated simulated(const PictureArgument& scene, const std::string& output, bool overwrite, const Words& words) {
   auto args = parsed(cli::parse_simulate, words);
+  if (scene.picture) {
+    PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));
+    args.scene.picture = std::make_shared<capture::ScenePicture>(scene_of(scene, executor));
+  }
   if (!output.empty()) {
     if (const std::string wrong = cli::wrong_files(args); !wrong.empty()) {
       throw Failure({ErrorCode::invalid_argument, wrong, {}});
@@ -50,11 +55,12 @@ py::object array_or_none(std::optional<SceneLinear> picture) {
   return array_of(Picture(*std::move(picture)));
 }
 
-py::tuple simulate(const std::string& output, bool overwrite, const Words& words) {
+py::tuple simulate(const py::object& scene, const std::string& output, bool overwrite, const Words& words) {
+  const PictureArgument picture = picture_argument(scene, "scene");
   std::optional<Simulated> made;
   {
     const py::gil_scoped_release released;
-    made = simulated(output, overwrite, words);
+    made = simulated(picture, output, overwrite, words);
   }
   std::vector<RawImagePtr> frames;
   for (RawFrame& frame : made->data.frames) frames.push_back(std::make_shared<RawImage>(RawImage{std::move(frame)}));

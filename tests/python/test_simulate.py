@@ -72,6 +72,29 @@ def test_the_blur_of_the_lens_is_in_frames_and_truth():
     assert blurred.report["lens_blur_px"] == 1.5
 
 
+def test_an_array_is_a_scene_like_the_file_of_its_samples(tmp_path, rng):
+    lit = np.exp(rng.uniform(-6, 0.5, (36, 48, 3))).astype(np.float32)  # some of it above white
+    (tmp_path / "lit.pfm").write_bytes(b"PF\n48 36\n-1.0\n" + lit[::-1].astype("<f4").tobytes())
+    codes = rng.integers(0, 256, (36, 48, 3)).astype(np.uint8)
+    (tmp_path / "codes.ppm").write_bytes(b"P6\n48 36\n255\n" + codes.tobytes())
+    for array, name in ((lit, "lit.pfm"), (lit.astype(float), "lit.pfm"), (codes, "codes.ppm"),
+                        (codes.astype(np.uint16) * 257, "codes.ppm"), (codes[::-1].copy()[::-1], "codes.ppm")):
+        options = dict(luminance=float(rng.uniform(0.1, 3)), seed=int(rng.integers(2**32)), frames=2)
+        ours, of_file = lowlux.simulate(array, **options), lowlux.simulate(tmp_path / name, **options)
+        for a, b in zip(ours.frames, of_file.frames):
+            np.testing.assert_array_equal(a.raw_image, b.raw_image)
+        np.testing.assert_array_equal(ours.truth, of_file.truth)
+        np.testing.assert_array_equal(ours.truth_e, of_file.truth_e)
+    lowlux.simulate(lit, tmp_path / "n.dng")
+    assert sorted(path.name for path in tmp_path.glob("n.*")) == ["n.dng", "n.truth.exr"]
+    for array, why in ((lit[..., 0], "height"), (np.where(lit > 1, np.nan, lit), "scene: .* is nan"), (-lit, "negative"),
+                       (lit.astype(int), "uint8"), (lit[:20], "22")):
+        with pytest.raises(lowlux.Error, match=why):
+            lowlux.simulate(array)
+    with pytest.raises(lowlux.ArgumentError, match="its own size"):
+        lowlux.simulate(lit, size=(48, 36))
+
+
 def test_comparing_files_and_arrays(night, tmp_path, command):
     a = lowlux.develop(night, tmp_path / "a.png", denoise="off").image
     b = lowlux.develop(night, tmp_path / "b.png").image

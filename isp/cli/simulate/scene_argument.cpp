@@ -84,7 +84,8 @@ Result<capture::Scene> chart_of(const SceneArgs& args, const capture::SceneSetup
 }
 
 Result<SceneOfArgs> picture_of(const SceneArgs& args, Executor& executor) {
-  auto picture = capture::read_picture(args.what, executor);
+  auto picture = args.picture ? Result<capture::ScenePicture>(std::move(*args.picture))
+                              : capture::read_picture(args.what, executor);
   if (!picture) {
     Error error = picture.error();
     static constexpr std::array<std::string_view, 5> made{"dark", "flat", "chart", "chart:macbeth", "chart:munsell"};
@@ -106,7 +107,7 @@ Result<SceneOfArgs> picture_of(const SceneArgs& args, Executor& executor) {
 Result<SceneOfArgs> extended_scene(const SceneArgs& args, Executor& executor) {
   const bool made =
       args.what == "dark" || args.what == "flat" || args.what == "chart" || args.what.starts_with("chart:");
-  if (!made) return picture_of(args, executor);
+  if (args.picture || !made) return picture_of(args, executor);
   const auto setup = setup_of(args);
   if (!setup) return tl::make_unexpected(setup.error());
   auto scene = args.what == "dark"   ? capture::dark_scene(*setup)

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "capture/file/picture_source.h"
 #include "capture/synthetic/synthetic_camera.h"
 #include "isp/cli/develop/develop_args.h"
 #include "isp/cli/simulate/burst_args.h"
@@ -28,6 +30,7 @@ struct LampArgs {
 /// Describes the scene in front of the camera.
 struct SceneArgs {
   std::string what;  // an image file, or dark, flat, chart, chart:macbeth, chart:munsell, chart:FILE.csv
+  std::shared_ptr<capture::ScenePicture> picture;  // an image in memory, used up; `what` names it in errors
   int width = 1200;
   int height = 800;
   bool size_given = false;

@@ -280,7 +280,7 @@ def merge(
 ) -> Merged: ...
 
 def simulate(
-    scene: _Path,
+    scene: Union[_Path, npt.NDArray[Any]],
     output: Optional[_Path] = ...,
     *,
     overwrite: bool = ...,

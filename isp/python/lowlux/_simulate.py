@@ -39,7 +39,8 @@ def simulate(scene, output=None, *, overwrite=False, size=None, light=None, lumi
              iso=None, white_luminance=None, quantise=None):
     """Simulate raw frames of a scene, as `lowlux simulate` does with the same options.
 
-    scene: a path of an image, or "dark", "flat", "chart", "chart:macbeth", "chart:munsell", "chart:FILE.csv".
+    scene: a path of an image, or "dark", "flat", "chart", "chart:macbeth", "chart:munsell", "chart:FILE.csv", or an array
+        of (height, width, 3): uint8 or uint16 codes of sRGB, or floats of linear sRGB, whose white (1) is at luminance.
     output: DNG to write, with the truth next to it as the command names it; None writes nothing.
     size: (width, height) [px]. luminance: of white in the scene [cd/m2]. exposure: time [s]. temperature: [C].
     lens_blur: standard deviation of the blur of the lens [px]; the truth is blurred too.
@@ -57,8 +58,10 @@ def simulate(scene, output=None, *, overwrite=False, size=None, light=None, lumi
     path = output_of(output)
     if not path and (truth is not None or truth_electrons is not None):
         raise ArgumentError("truth: a file of the truth requires an output", "truth")
-    words = [*words_of(options, ("lamp",)), b"--output=" + (path or b"none.dng"), b"--", bytes_of(scene, "scene")]
-    made, report, found, found_e, motion, warnings = _lowlux.simulate(path, overwrite, words)
+    name = b"scene" if isinstance(scene, np.ndarray) else bytes_of(scene, "scene")
+    words = [*words_of(options, ("lamp",)), b"--output=" + (path or b"none.dng"), b"--", name]
+    source = scene if isinstance(scene, np.ndarray) else name
+    made, report, found, found_e, motion, warnings = _lowlux.simulate(source, path, overwrite, words)
     return Simulated(made, found, found_e, json.loads(motion) if motion else None, json.loads(report), warnings)
 
 
