@@ -157,6 +157,7 @@ def test_profiles(tmp_path, command, night):
     signal = np.array([0.0, 10, 1000])
     np.testing.assert_allclose(again.variance_dn2(signal), gain**2 * (noise_e**2 + signal / gain) + 1 / 12, rtol=1e-12)
     np.testing.assert_array_equal(again.variance_dn2([0, 10, 1000]), again.variance_dn2(signal))
+    assert again.variance_dn2(-50) == again.variance_dn2(0) and (again.variance_dn2(-signal) == again.variance_dn2(0)).all()
     again.save(tmp_path / "c.json")
     assert (tmp_path / "c.json").read_bytes() == (tmp_path / "a.json").read_bytes()
     np.testing.assert_array_equal(lowlux.develop(night, profile=again).image,

@@ -58,15 +58,16 @@ class Profile:
         """Return the temporal variance of a raw value [DN^2], of the signal above black [DN], a number or a sequence of
         them, whose result is an array.
 
-        Photon transfer (EMVA 1288 release 4.0, Eq. 15): K^2 sigma_d^2 + 1/12 + K signal_dn, with K the system gain
-        [DN/e-] and sigma_d the read noise [e-]. Error: ArgumentError if the system gain is not known.
+        Photon transfer (EMVA 1288 release 4.0, Eq. 15): K^2 sigma_d^2 + 1/12 + K max(signal_dn, 0), with K the system
+        gain [DN/e-] and sigma_d the read noise [e-]: a value below black is noise without light. Error: ArgumentError
+        if the system gain is not known.
         """
         sensor = self.gain(iso).get("sensor")
         if not sensor:
             raise ArgumentError("the profile does not state the system gain", "profile")
         gain, noise_e = sensor["system_gain_dn_per_e"]["value"], sensor["read_noise_e"]["value"]
         signal = signal_dn if isinstance(signal_dn, (int, float)) else np.asarray(signal_dn, dtype=float)
-        return (gain * noise_e) ** 2 + 1 / 12 + gain * signal
+        return (gain * noise_e) ** 2 + 1 / 12 + gain * np.maximum(signal, 0)
 
 
 # Options of the command that print, or that this function has arguments for.
