@@ -74,7 +74,7 @@ std::string look_name(const isp::DevelopPlan& plan) {
 void add_look_effects(Lines& out, std::span<const isp::LookEffect> effects) {
   for (const isp::LookEffect& effect : effects) {
     const std::string size = std::isfinite(effect.size) ? fmt::format("up to {:.2g} CIEDE2000", effect.size)
-                                                        : std::string("no measurable size");
+                                                        : std::string("a matter of preference, on request only");
     out.add("", fmt::format("{} {}: {}", effect.name, effect.used ? "applied" : "skipped", size));
   }
 }
