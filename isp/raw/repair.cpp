@@ -16,6 +16,8 @@ constexpr double range_factor = 4;
 constexpr double noise_factor = 8;
 constexpr double floor_of_white = 0.01;
 constexpr double known_noise_factor = 5, detail_factor = 12;
+// For fewer neighbours, which show less of the detail of the scene, and less of a star.
+constexpr double border_factor = 2, border_shared = 0.5;
 constexpr double noise_range = 4.5;  // range of eight normal deviates that one in a hundred exceeds
 constexpr double max_shared = 0.1, max_shared_green = 0.07;
 // For a centred Gaussian of 1.5 pixels FWHM: exp(-1/2 / 0.637^2) less a quarter of it for the neighbour across. At
@@ -30,12 +32,21 @@ struct Neighbours {
   Sample high;
 };
 
+// Returns the coordinate at a distance, or beyond a border the one at the same distance on the other side, which has
+// the same colour in a Bayer mosaic.
+int across(int at, int distance, int size) {
+  const int there = at + distance;
+  return there >= 0 && there < size ? there : at - distance;
+}
+
 template <class Sample>
 Neighbours<Sample> eight_same_colour(const PlaneView<const Sample>& dn, int x, int y) {
-  const Sample* above = dn.row(y - 2) + x;
-  const Sample* here = dn.row(y) + x;
-  const Sample* below = dn.row(y + 2) + x;
-  const std::array<Sample, 8> v{above[-2], above[0], above[2], here[-2], here[2], below[-2], below[0], below[2]};
+  const int left = across(x, -2, dn.width), right = across(x, 2, dn.width);
+  const Sample* above = dn.row(across(y, -2, dn.height));
+  const Sample* here = dn.row(y);
+  const Sample* below = dn.row(across(y, 2, dn.height));
+  const std::array<Sample, 8> v{above[left], above[x],    above[right], here[left],
+                                here[right], below[left], below[x],     below[right]};
   return {*std::min_element(v.begin(), v.end()), *std::max_element(v.begin(), v.end())};
 }
 
@@ -61,7 +72,9 @@ double excess(const PlaneView<const Sample>& dn, int x, int y) {
 // Returns the direct neighbours' mean excess over their same-colour neighbours.
 template <class Sample>
 double shared_excess(const PlaneView<const Sample>& dn, int x, int y) {
-  return (excess(dn, x - 1, y) + excess(dn, x + 1, y) + excess(dn, x, y - 1) + excess(dn, x, y + 1)) / 4;
+  const int left = across(x, -1, dn.width), right = across(x, 1, dn.width);
+  const int above = across(y, -1, dn.height), below = across(y, 1, dn.height);
+  return (excess(dn, left, y) + excess(dn, right, y) + excess(dn, x, above) + excess(dn, x, below)) / 4;
 }
 
 // Data of the defect test that depends on the frame, not on the pixel.
@@ -96,7 +109,8 @@ double most_shared(const Criterion<Sample>& judge, int x, int y, double own) {
   if (!judge.noise_is_known()) return cap;
   double variance = 0;
   for (const auto [dx, dy] : {std::array{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
-    variance += judge.variance(x + dx, y + dy, judge.dn.at(x + dx, y + dy)) / 4;
+    const int u = across(x, dx, judge.dn.width), v = across(y, dy, judge.dn.height);
+    variance += judge.variance(u, v, judge.dn.at(u, v)) / 4;
   }
   const double scatter = shared_deviation * std::sqrt(variance);
   return std::min(cap, (green ? star_fraction_green : star_fraction) * own - certain * scatter);
@@ -108,9 +122,12 @@ bool is_defect(const Criterion<Sample>& judge, int x, int y) {
   const double value = judge.dn.at(x, y);
   const bool hot = value > n.high;
   const double beyond = hot ? value - n.high : n.low - value;
-  if (beyond <= min_distance(judge, x, y, n, hot ? n.high : n.low)) return false;
+  const bool is_inside = x >= 2 && y >= 2 && x < judge.dn.width - 2 && y < judge.dn.height - 2;
+  const double least = min_distance(judge, x, y, n, hot ? n.high : n.low);
+  if (beyond <= (is_inside ? 1 : border_factor) * least) return false;
   const double own = excess(judge.dn, x, y);
-  return shared_excess(judge.dn, x, y) * (own > 0 ? 1 : -1) < most_shared(judge, x, y, std::fabs(own));
+  const double limit = most_shared(judge, x, y, (is_inside ? 1 : border_shared) * std::fabs(own));
+  return shared_excess(judge.dn, x, y) * (own > 0 ? 1 : -1) < limit;
 }
 
 // Returns the smallest noise ratio of pixels x .. x + count - 1 of a row.
@@ -139,6 +156,14 @@ defect_rows::Bounds min_bounds(const Criterion<Sample>& judge, int x, int count,
   return bounds;
 }
 
+// Tests pixels of a row near a border, from one to below another.
+template <class Sample>
+void judge_border(const Criterion<Sample>& judge, int first, int last, int y, std::vector<Pixel>& found) {
+  for (int x = first; x < last; ++x) {
+    if (is_defect(judge, x, y)) found.push_back({x, y});
+  }
+}
+
 // Tests a run of the row with the fast kernel first, so that the slower exact test runs on few pixels.
 template <class Sample>
 void judge_row(const Criterion<Sample>& judge, int y, std::vector<Pixel>& found) {
@@ -164,8 +189,16 @@ template <class Sample>
 std::vector<Pixel> judge_all(const Criterion<Sample>& judge, Executor& executor) {
   std::vector<std::vector<Pixel>> found(executor.width());
   for_each_band(executor, judge.dn.height, [&](RowBand band, int index) {
-    const int last = std::min(band.last, judge.dn.height - 2);
-    for (int y = std::max(band.first, 2); y < last; ++y) judge_row(judge, y, found[index]);
+    const int width = judge.dn.width, height = judge.dn.height;
+    for (int y = band.first; y < band.last; ++y) {
+      if (y < 2 || y >= height - 2) {
+        judge_border(judge, 0, width, y, found[index]);
+        continue;
+      }
+      judge_border(judge, 0, 2, y, found[index]);
+      judge_row(judge, y, found[index]);
+      judge_border(judge, width - 2, width, y, found[index]);
+    }
   });
   std::vector<Pixel> all;
   for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());

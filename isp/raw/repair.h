@@ -31,7 +31,9 @@ struct DefectNoise {
 ///      than a tenth of its own excess (7 % at green sites), and 3.5 standard deviations of noise below that of a star.
 ///      A star of 1.5 pixels FWHM, in the middle of the pixel, gives its neighbours a fifth; at green sites a ninth,
 ///      because red and blue are weaker.
-/// @return pixels ascending by row, then column. Pixels within two of the border are not tested.
+/// Within two pixels of a border, the neighbours that are missing are those of the opposite side, and the distance
+/// of 1. is twice as large.
+/// @return pixels ascending by row, then column; none of frames below 5 x 5 pixels
 std::vector<Pixel> find_defects(const RawDn& raw, const BlackPoint& black, const DefectNoise& noise,
                                 Executor& executor);
 

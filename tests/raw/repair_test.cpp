@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <random>
 
 #include "isp/raw/black_point.h"
 #include "tests/support/frames.h"
@@ -70,11 +73,44 @@ TEST(FindDefects, KeepsStarsWhereverTheyFallOnTheGrid) {
   }
 }
 
+/// Draws a position within two pixels of a border.
+Pixel at_border(std::mt19937& random) {
+  std::uniform_int_distribution<int> along(0, side - 1), across(0, 3);
+  const int near = std::array{0, 1, side - 2, side - 1}[static_cast<std::size_t>(across(random))];
+  return std::uniform_int_distribution<int>(0, 1)(random) == 0 ? Pixel{near, along(random)}
+                                                               : Pixel{along(random), near};
+}
+
+TEST(FindDefects, FindsThoseAtTheBorders) {
+  std::mt19937 random(20261128);
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    RawDn raw = dark_sky(seed);
+    const Pixel hot = at_border(random);
+    add(raw, hot.x, hot.y, std::uniform_real_distribution<double>(800, 3500)(random));
+    EXPECT_EQ(defects_of(raw), std::vector<Pixel>{hot}) << "seed " << seed << " at " << hot.x << ", " << hot.y;
+  }
+}
+
+TEST(FindDefects, KeepsStarsAtTheBorders) {
+  std::mt19937 random(20261129);
+  std::uniform_real_distribution<double> offset(-0.5, 0.5), widening(0, 1), peak(300, 3500);
+  for (unsigned seed = 1; seed <= 3000; ++seed) {
+    RawDn raw = dark_sky(seed);
+    const Pixel at = at_border(random);
+    const double x = at.x + offset(random), y = at.y + offset(random),
+                 width = 1.5 + std::pow(widening(random), 3);  // most near 1.5
+    add_star(raw, x, y, width, peak(random));
+    EXPECT_TRUE(defects_of(raw).empty()) << "seed " << seed << " at " << x << ", " << y << " fwhm " << width;
+  }
+}
+
 TEST(FindDefects, KeepsEdgesAndFineLines) {
   const RawDn edge = test::bayer_frame(side, side, BayerPhase::gbrg, [](int x, int) { return x < 48 ? 300 : 3800; });
   EXPECT_TRUE(defects_of(edge).empty());
   const RawDn line = test::bayer_frame(side, side, BayerPhase::gbrg, [](int x, int) { return x == 47 ? 3800 : 300; });
   EXPECT_TRUE(defects_of(line).empty());
+  const RawDn border = test::bayer_frame(side, side, BayerPhase::gbrg, [](int x, int) { return x == 0 ? 3800 : 300; });
+  EXPECT_TRUE(defects_of(border).empty());
 }
 
 TEST(FindDefects, AnyThreadCountFindsTheSame) {
