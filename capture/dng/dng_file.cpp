@@ -11,6 +11,7 @@ namespace lowlux::capture {
 namespace {
 
 constexpr std::size_t max_directories = 64;
+constexpr double max_offset = 9007199254740992.0;  // 2^53: doubles hold all integers up to here
 
 bool is_full_raw(const TiffDirectory& directory) {
   const auto kind = directory.whole_or(tag::new_subfile_type, 0);
@@ -25,11 +26,11 @@ double area_of(const TiffDirectory& directory) {
 }
 
 /// Returns the offsets of the direct subdirectories of a directory, and of the one that follows it.
-std::vector<std::uint32_t> neighbours(const TiffDirectory& directory) {
-  std::vector<std::uint32_t> offsets;
+std::vector<std::uint64_t> neighbours(const TiffDirectory& directory) {
+  std::vector<std::uint64_t> offsets;
   if (const auto below = directory.numbers(tag::sub_ifds, 1, max_directories); below && *below) {
     for (const double offset : **below) {
-      if (offset > 0 && offset <= 4294967295.0) offsets.push_back(static_cast<std::uint32_t>(offset));
+      if (offset > 0 && offset <= max_offset) offsets.push_back(static_cast<std::uint64_t>(offset));
     }
   }
   if (directory.next != 0) offsets.push_back(directory.next);
@@ -39,11 +40,11 @@ std::vector<std::uint32_t> neighbours(const TiffDirectory& directory) {
 /// Returns all directories, the first one first; damaged ones that are not needed otherwise are left out.
 std::vector<TiffDirectory> all_directories(const TiffFile& tiff, TiffDirectory first) {
   std::vector<TiffDirectory> found;
-  std::set<std::uint32_t> seen{tiff.first_directory()};
-  std::vector<std::uint32_t> pending = neighbours(first);
+  std::set<std::uint64_t> seen{tiff.first_directory()};
+  std::vector<std::uint64_t> pending = neighbours(first);
   found.push_back(std::move(first));
   while (!pending.empty() && found.size() < max_directories) {
-    const std::uint32_t offset = pending.front();
+    const std::uint64_t offset = pending.front();
     pending.erase(pending.begin());
     if (!seen.insert(offset).second) continue;
     auto directory = tiff.directory(offset);

@@ -34,7 +34,7 @@ Result<DngDescription> decoded_image(const DngFile& dng, DngDescription expected
   if (fits(expected.image, h)) return expected;
   for (const TiffDirectory& directory : dng.raw_images) {
     const auto image = dng_image(directory, file_bytes);
-    if (image && !image->is_float && !image->is_lossy && !image->is_jpeg_xl && fits(*image, h))
+    if (image && image->decoder == DngDecoder::libraw && fits(*image, h))
       return describe_dng(dng, directory, file_bytes);
   }
   return fail(ErrorCode::malformed, "the decoder delivers " + std::to_string(h.raw_width) + " x " +
@@ -147,6 +147,15 @@ Result<RawFrame> complete_linearized_dng(const DngFile& dng, DngDescription desc
   auto linear = linearize_codes(directory, directory_of_list(dng, directory, 2), described.image.bits, frame.raw);
   if (!linear) return pass_on(linear);
   return finished(dng, described, std::move(frame), use, true);
+}
+
+Result<RawFrame> complete_code_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes,
+                                   const XTransUse& use) {
+  RawFrame frame = std::move(described.frame);
+  frame.raw.dn = std::move(codes);
+  auto linear = apply_linearization_table(*described.directory, described.image.bits, frame.raw.dn);
+  if (!linear) return pass_on(linear);
+  return finished(dng, described, std::move(frame), use);
 }
 
 Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described, Plane<float> samples,

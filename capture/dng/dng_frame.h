@@ -29,6 +29,11 @@ Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std:
 Result<RawFrame> complete_linearized_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes,
                                          const XTransUse& use = {});
 
+/// Adds the samples of an image of integers that LibRaw did not decode, given its codes, to which LinearizationTable is
+/// applied. Errors: a damaged table.
+Result<RawFrame> complete_code_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes,
+                                   const XTransUse& use = {});
+
 /// Adds floating-point samples to the frame. Errors: those of unusable_sample (isp/base/float_samples.h).
 Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described, Plane<float> samples,
                                     const XTransUse& use = {});

@@ -5,9 +5,9 @@
 #include <tuple>
 #include <utility>
 
-#include "capture/dng/dng_floats.h"
 #include "capture/dng/dng_jpeg_xl.h"
 #include "capture/dng/dng_lossy.h"
+#include "capture/dng/dng_rows.h"
 #include "capture/dng/dng_tags.h"
 #include "capture/file/pass_on.h"
 #include "isp/base/text.h"
@@ -15,16 +15,12 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr std::uint32_t min_size = 22;     // LibRaw treats smaller ones as thumbnails
 constexpr std::uint32_t max_size = 65535;  // LibRaw keeps sizes in 16 bits
 
-Result<void> check_compression(std::uint32_t compression) {
-  if (compression == tag::compression_none || compression == tag::compression_jpeg) return {};
-  std::string message =
-      "the raw image is compressed with " + compression_name(compression) + ", which lowlux does not decode: ";
-  message += compression == tag::compression_vc5 ? "convert it with GoPro's or Adobe's DNG converter"
-                                                 : "convert it to a DNG with lossless JPEG or no compression";
-  return fail(ErrorCode::unsupported, std::move(message), tag::compression.name);
+tl::unexpected<Error> wrong_size(std::int64_t width, std::int64_t height, int least) {
+  return fail(ErrorCode::malformed, "a raw image of " + std::to_string(width) + " x " + std::to_string(height) +
+                                        " pixels cannot be decoded, " + std::to_string(least) +
+                                        " to 65535 each way can");
 }
 
 /// Returns whether the samples are floating-point numbers.
@@ -126,40 +122,70 @@ Result<void> fill_mosaic(const TiffDirectory& directory, DngImage& image) {
   return {};
 }
 
-/// Returns the tile width; 0 for strips.
-Result<std::uint32_t> tile_width_of(const TiffDirectory& directory, const DngParts& parts) {
-  if (!parts.tiled) return 0;
-  return required_whole(directory, tag::tile_width);
+/// Checks that lossless JPEG is stored as LibRaw reads it: in a classic TIFF, in tiles or strips that it can take for
+/// tiles (as_tiles_of_libraw), of an image that it does not take for a thumbnail.
+Result<void> check_lossless_jpeg(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
+  if (directory.is_big_tiff) {
+    return fail(ErrorCode::unsupported,
+                "lossless JPEG in a BigTIFF is not supported: convert it to a DNG below 4 GB, or without compression",
+                tag::compression.name);
+  }
+  if (std::min(image.width, image.height) < min_libraw_side)
+    return wrong_size(image.width, image.height, min_libraw_side);
+  if (!is_jpeg_in_strips(directory)) return dng_parts(directory, file_bytes).map([](const DngParts& /*parts*/) {});
+  auto grid = dng_grid(directory, image, file_bytes);
+  if (!grid) return pass_on(grid);
+  if (grid->count == 1) {
+    return fail(ErrorCode::malformed, "the image has more than one strip of lossless JPEG, but RowsPerStrip states one",
+                tag::rows_per_strip.name);
+  }
+  if (directory.find(tag::strip_offsets)->type == TiffEntry::Type::u32) return {};
+  return fail(ErrorCode::unsupported, "lossless JPEG in strips is supported with offsets of 32 bits only",
+              tag::strip_offsets.name);
 }
 
-/// Checks that image data lie inside the file, and where LibRaw reads them: without compression contiguously, row after
-/// row; with lossless JPEG in one strip, or in tiles.
-Result<void> check_storage(const TiffDirectory& directory, const DngImage& image, bool compressed,
-                           std::size_t file_bytes) {
-  auto parts = dng_parts(directory, file_bytes);
-  if (!parts) return pass_on(parts);
-  auto tile_width = tile_width_of(directory, *parts);
-  if (!tile_width) return pass_on(tile_width);
-  double total = 0;
-  bool in_one_piece = true;
-  for (std::size_t i = 0; i < parts->offset.size(); ++i) {
-    total += parts->bytes[i];
-    if (i > 0 && parts->offset[i] != parts->offset[i - 1] + parts->bytes[i - 1]) in_one_piece = false;
+Result<DngDecoder> decoder_of(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
+  auto compression = directory.whole_or(tag::compression, tag::compression_none);
+  if (!compression) return pass_on(compression);
+  if (image.is_float || is_deflate(*compression)) return DngDecoder::rows;
+  switch (*compression) {
+    case tag::compression_none:
+      return is_for_libraw(directory, image, file_bytes) ? DngDecoder::libraw : DngDecoder::rows;
+    case tag::compression_jpeg:
+      return DngDecoder::libraw;
+    case tag::compression_lossy_jpeg:
+      return DngDecoder::lossy_jpeg;
+    case tag::compression_jpeg_xl:
+      return DngDecoder::jpeg_xl;
+    default:
+      break;
   }
-  const bool side_by_side = parts->tiled && *tile_width != static_cast<std::uint32_t>(image.width);
-  if (compressed ? !parts->tiled && parts->offset.size() > 1 : side_by_side || !in_one_piece) {
+  std::string message =
+      "the raw image is compressed with " + compression_name(*compression) + ", which lowlux does not decode: ";
+  message += *compression == tag::compression_vc5 ? "convert it with GoPro's or Adobe's DNG converter"
+                                                  : "convert it to a DNG with lossless JPEG or no compression";
+  return fail(ErrorCode::unsupported, std::move(message), tag::compression.name);
+}
+
+/// Checks that the image data are inside the file and stored as their decoder reads them.
+Result<void> check_storage(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
+  if (image.is_planar && image.decoder != DngDecoder::rows) {
     return fail(ErrorCode::unsupported,
-                compressed ? "lossless JPEG in more than one strip is not supported: convert to tiles or one strip"
-                           : "uncompressed image data in more than one piece is not supported: convert to one strip");
+                "images stored colour after colour are supported without compression or with Deflate only",
+                tag::planar_configuration.name);
   }
-  const std::int64_t row_bits = std::int64_t{image.width} * image.samples * image.bits;
-  const std::int64_t needed = (row_bits + 7) / 8 * image.height;
-  if (!compressed && total < static_cast<double>(needed)) {
-    return fail(ErrorCode::malformed, "the image data has " + number_text(total) + " bytes, " +
-                                          std::to_string(image.width) + " x " + std::to_string(image.height) +
-                                          " pixels of " + std::to_string(image.bits) + " bits need " +
-                                          std::to_string(needed));
+  switch (image.decoder) {
+    case DngDecoder::rows:
+      return check_row_image(directory, image, file_bytes);
+    case DngDecoder::lossy_jpeg:
+      return check_lossy_image(directory, image, file_bytes);
+    case DngDecoder::jpeg_xl:
+      return check_jpeg_xl_image(directory, image, file_bytes);
+    case DngDecoder::libraw:
+      break;
   }
+  const auto compression = directory.whole_or(tag::compression, tag::compression_none);
+  if (compression && *compression == tag::compression_jpeg) return check_lossless_jpeg(directory, image, file_bytes);
   return {};
 }
 
@@ -180,10 +206,10 @@ Result<void> fill_layout(const TiffDirectory& directory, DngImage& image) {
   }
   auto planar = directory.whole_or(tag::planar_configuration, 1);
   if (!planar) return pass_on(planar);
-  if (image.samples == 3 && *planar != 1) {
-    return fail(ErrorCode::unsupported, "images stored colour after colour are not supported",
-                tag::planar_configuration.name);
+  if (*planar != 1 && *planar != 2) {
+    return fail(ErrorCode::malformed, "the tag PlanarConfiguration is damaged", tag::planar_configuration.name);
   }
+  image.is_planar = image.samples == 3 && *planar == 2;
   image.layout = image.samples == 1 ? SensorLayout::monochrome : SensorLayout::linear_rgb;
   return {};
 }
@@ -197,7 +223,7 @@ Result<void> fill_interleave(const TiffDirectory& directory, DngImage& image) {
     auto stated = directory.whole_or(name, 1);
     if (!stated) return pass_on(stated);
     if (*stated == 1) continue;
-    if (!image.is_jpeg_xl) {
+    if (image.decoder != DngDecoder::jpeg_xl) {
       return fail(ErrorCode::unsupported, "raws whose rows or columns are stored apart are supported in JPEG XL alone",
                   name.name);
     }
@@ -218,25 +244,11 @@ Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_byte
   if (!height) return pass_on(height);
   auto samples = directory.whole_or(tag::samples_per_pixel, 1);
   if (!samples) return pass_on(samples);
-  auto compression = directory.whole_or(tag::compression, tag::compression_none);
-  if (!compression) return pass_on(compression);
   auto is_float = holds_floats(directory);
   if (!is_float) return pass_on(is_float);
-  const std::uint32_t least = *is_float ? 1 : min_size;
-  if (std::min(*width, *height) < least || std::max(*width, *height) > max_size) {
-    return fail(ErrorCode::malformed, "a raw image of " + std::to_string(*width) + " x " + std::to_string(*height) +
-                                          " pixels cannot be decoded, " + std::to_string(least) +
-                                          " to 65535 each way can");
-  }
-  const bool is_lossy = !*is_float && *compression == tag::compression_lossy_jpeg;
-  const bool is_jpeg_xl = !*is_float && *compression == tag::compression_jpeg_xl;
-  if (!*is_float && !is_lossy && !is_jpeg_xl) {
-    if (auto known = check_compression(*compression); !known) return pass_on(known);
-  }
+  if (std::min(*width, *height) < 1 || std::max(*width, *height) > max_size) return wrong_size(*width, *height, 1);
   DngImage image;
   image.is_float = *is_float;
-  image.is_lossy = is_lossy;
-  image.is_jpeg_xl = is_jpeg_xl;
   image.width = static_cast<int>(*width);
   image.height = static_cast<int>(*height);
   image.samples = static_cast<int>(std::min<std::uint32_t>(*samples, 65535));
@@ -244,12 +256,11 @@ Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_byte
   if (!bits) return pass_on(bits);
   image.bits = *bits;
   if (auto layout = fill_layout(directory, image); !layout) return pass_on(layout);
+  auto decoder = decoder_of(directory, image, file_bytes);
+  if (!decoder) return pass_on(decoder);
+  image.decoder = *decoder;
   if (auto interleave = fill_interleave(directory, image); !interleave) return pass_on(interleave);
-  auto stored = image.is_float     ? check_float_image(directory, image, file_bytes)
-                : image.is_lossy   ? check_lossy_image(directory, image, file_bytes)
-                : image.is_jpeg_xl ? check_jpeg_xl_image(directory, image, file_bytes)
-                                   : check_storage(directory, image, *compression == tag::compression_jpeg, file_bytes);
-  if (!stored) return pass_on(stored);
+  if (auto stored = check_storage(directory, image, file_bytes); !stored) return pass_on(stored);
   return image;
 }
 

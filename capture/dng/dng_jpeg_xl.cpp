@@ -71,11 +71,6 @@ Result<Plane<std::uint16_t>> decode_jpeg_xl_image(std::span<const std::byte> fil
                                                   const DngImage& image, const ReadLimits& limits) {
   auto grid = dng_grid(directory, image, file.size());
   if (!grid) return pass_on(grid);
-  double part_bytes = 0;
-  for (std::size_t i = 0; i < grid->count; ++i) part_bytes += grid->at.bytes[i];
-  if (part_bytes > static_cast<double>(file.size())) {
-    return fail(ErrorCode::malformed, "the strips or tiles of the image overlap: the file is damaged");
-  }
   auto decoded = decode_contained(job_of(file, image, *grid), limits, DecoderProgram::libjxl);
   if (!decoded) return pass_on(decoded);
   if (decoded->samples.width() != image.width * image.samples || decoded->samples.height() != image.height) {

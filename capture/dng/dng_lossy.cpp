@@ -96,10 +96,10 @@ Result<Curve> polynomial_curve(const std::vector<Polynomial>& polynomials, const
               tag::opcode_list[1].name);
 }
 
-void apply_curves(const std::vector<Curve>& curves, RawDn& raw) {
-  for (int y = 0; y < raw.dn.height(); ++y) {
-    std::uint16_t* row = raw.dn.row(y);
-    for (int x = 0; x < raw.dn.width(); ++x) row[x] = curves[static_cast<std::size_t>(x) % curves.size()][row[x]];
+void apply_curves(const std::vector<Curve>& curves, Plane<std::uint16_t>& codes) {
+  for (int y = 0; y < codes.height(); ++y) {
+    std::uint16_t* row = codes.row(y);
+    for (int x = 0; x < codes.width(); ++x) row[x] = curves[static_cast<std::size_t>(x) % curves.size()][row[x]];
   }
 }
 
@@ -132,27 +132,31 @@ Result<Plane<std::uint16_t>> decode_lossy_image(std::span<const std::byte> file,
   return out;
 }
 
-Result<void> linearize_codes(const TiffDirectory& directory, const TiffDirectory& opcodes, int bits, RawDn& raw) {
+Result<void> apply_linearization_table(const TiffDirectory& directory, int bits, Plane<std::uint16_t>& codes) {
   auto linear = linearization(directory, bits);
   if (!linear) return pass_on(linear);
+  if (directory.find(tag::linearization_table) == nullptr) return {};
+  Curve curve(linear->size());
+  std::transform(linear->begin(), linear->end(), curve.begin(),
+                 [](double dn) { return static_cast<std::uint16_t>(std::clamp(dn, 0.0, linear_white_dn)); });
+  apply_curves({curve}, codes);
+  return {};
+}
+
+Result<void> linearize_codes(const TiffDirectory& directory, const TiffDirectory& opcodes, int bits, RawDn& raw) {
   auto polynomials =
       opcodes.bytes(tag::opcode_list[1]).and_then([&](auto bytes) { return read_polynomials(bytes, raw.active); });
   if (!polynomials) return pass_on(polynomials);
-  if (polynomials->empty() && directory.find(tag::linearization_table) == nullptr) return {};
+  if (polynomials->empty()) return apply_linearization_table(directory, bits, raw.dn);
+  auto linear = linearization(directory, bits);
+  if (!linear) return pass_on(linear);
   std::vector<Curve> curves(raw.layout == SensorLayout::linear_rgb ? 3 : 1);
   for (std::size_t plane = 0; plane < curves.size(); ++plane) {
-    if (polynomials->empty()) {
-      curves[plane].resize(linear->size());
-      std::transform(linear->begin(), linear->end(), curves[plane].begin(),
-                     [](double dn) { return static_cast<std::uint16_t>(std::clamp(dn, 0.0, linear_white_dn)); });
-      continue;
-    }
     auto curve = polynomial_curve(*polynomials, *linear, raw, plane);
     if (!curve) return pass_on(curve);
     curves[plane] = *curve;
   }
-  apply_curves(curves, raw);
-  if (polynomials->empty()) return {};
+  apply_curves(curves, raw.dn);
   raw.white_dn.fill(linear_white_dn);
   raw.black_tag =
       BlackLevel{.samples = static_cast<int>(curves.size()), .pattern_dn = std::vector<double>(curves.size(), 0.0)};

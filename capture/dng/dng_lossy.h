@@ -21,6 +21,10 @@ Result<void> check_lossy_image(const TiffDirectory& directory, const DngImage& i
 Result<Plane<std::uint16_t>> decode_lossy_image(std::span<const std::byte> file, const TiffDirectory& directory,
                                                 const DngImage& image);
 
+/// Replaces codes of `bits` bits by their values in LinearizationTable, if there is one; those beyond it get its last
+/// value. Errors: a damaged table.
+Result<void> apply_linearization_table(const TiffDirectory& directory, int bits, Plane<std::uint16_t>& codes);
+
 /// Replaces the codes of a readout, of `bits` bits, by linear samples: LinearizationTable, then the MapPolynomial
 /// opcodes of OpcodeList2 (DNG 1.4, chapter 7). With polynomials, samples are 16 bits, black is 0 and white 65535: a
 /// polynomial takes (code - black) / (white - black), which it clips to 0..1 before and after.

@@ -1,6 +1,7 @@
 #include "capture/dng/dng_storage.h"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 #include "capture/dng/dng_tags.h"
@@ -34,6 +35,21 @@ Result<PartSize> part_size(const TiffDirectory& directory, const DngImage& image
   return fail(ErrorCode::malformed, "tiles of " + std::to_string(*width) + " x " + std::to_string(*height) +
                                         " pixels are too large for an image of " + std::to_string(image.width) + " x " +
                                         std::to_string(image.height));
+}
+
+/// Returns whether two of the first `count` parts share bytes of the file.
+bool do_overlap(const DngParts& parts, std::size_t count) {
+  std::vector<std::size_t> order(count);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return parts.offset[a] < parts.offset[b]; });
+  double end = 0;
+  for (const std::size_t i : order) {
+    if (parts.bytes[i] == 0) continue;
+    if (parts.offset[i] < end) return true;
+    end = parts.offset[i] + parts.bytes[i];
+  }
+  return false;
 }
 
 }  // namespace
@@ -79,10 +95,26 @@ Result<DngGrid> dng_grid(const TiffDirectory& directory, const DngImage& image, 
   DngGrid grid{.at = *std::move(at), .width = static_cast<int>(size->width), .height = static_cast<int>(size->height)};
   grid.across = (image.width + grid.width - 1) / grid.width;
   const int down = (image.height + grid.height - 1) / grid.height;
-  grid.count = static_cast<std::size_t>(down) * static_cast<std::size_t>(grid.across);
-  if (grid.at.offset.size() >= grid.count) return grid;
-  return fail(ErrorCode::malformed, "the image needs " + std::to_string(grid.count) +
-                                        " strips or tiles, the file has " + std::to_string(grid.at.offset.size()));
+  grid.covering = static_cast<std::size_t>(down) * static_cast<std::size_t>(grid.across);
+  grid.count = grid.covering * static_cast<std::size_t>(image.is_planar ? image.samples : 1);
+  if (grid.at.offset.size() < grid.count) {
+    return fail(ErrorCode::malformed, "the image of " + std::to_string(image.width) + " x " +
+                                          std::to_string(image.height) + " pixels needs " + std::to_string(grid.count) +
+                                          " strips or tiles, the file has " + std::to_string(grid.at.offset.size()));
+  }
+  if (!do_overlap(grid.at, grid.count)) return grid;
+  return fail(ErrorCode::malformed, "the strips or tiles of the image overlap: the file is damaged");
+}
+
+bool is_jpeg_in_strips(const TiffDirectory& directory) {
+  const auto compression = directory.whole_or(tag::compression, tag::compression_none);
+  const TiffEntry* const strips = directory.find(tag::strip_offsets);
+  return compression && *compression == tag::compression_jpeg && directory.find(tag::tile_offsets) == nullptr &&
+         strips != nullptr && strips->count > 1;
+}
+
+bool is_deflate(std::uint32_t compression) {
+  return compression == tag::compression_deflate || compression == tag::compression_old_deflate;
 }
 
 std::string compression_name(std::uint32_t compression) {

@@ -15,14 +15,24 @@
 
 namespace lowlux::capture {
 
+inline constexpr int min_libraw_side = 22;  // LibRaw treats smaller images as thumbnails
+
+/// What decodes the samples of a raw image.
+enum class DngDecoder : std::uint8_t {
+  libraw,      // integers without compression, or in lossless JPEG
+  rows,        // integers and floating-point numbers, uncompressed or deflated (dng_rows.h)
+  lossy_jpeg,  // 8-bit codes in baseline JPEG, one for each strip or tile (dng_lossy.h)
+  jpeg_xl      // codes in JPEG XL, one for each strip or tile (dng_jpeg_xl.h)
+};
+
 /// Layout and storage of the samples of one raw image.
 struct DngImage {
-  int width = 0, height = 0;                      // of the readout
-  int samples = 1;                                // per pixel
-  int bits = 0;                                   // per sample, as stored
-  bool is_float = false;                          // floating-point samples, of 16, 24 or 32 bits
-  bool is_lossy = false;                          // 8-bit codes in baseline JPEG, one for each strip or tile
-  bool is_jpeg_xl = false;                        // codes in JPEG XL, one for each strip or tile
+  int width = 0, height = 0;  // of the readout
+  int samples = 1;            // per pixel
+  int bits = 0;               // per sample, as stored
+  bool is_float = false;      // floating-point samples, of 16, 24 or 32 bits
+  bool is_planar = false;     // stored colour after colour, and not pixel after pixel
+  DngDecoder decoder = DngDecoder::libraw;
   int row_interleave = 1, column_interleave = 1;  // images that they are stored as; 1 but for JPEG XL
   SensorLayout layout = SensorLayout::bayer;
   BayerPhase phase = BayerPhase::rggb;
@@ -43,23 +53,33 @@ struct DngParts {
 
 Result<DngParts> dng_parts(const TiffDirectory& directory, std::size_t file_bytes);
 
-/// Parts of equal size that cover an image row after row; the last ones may extend beyond it.
+/// Parts of equal size that cover an image row after row; the last ones may extend beyond it. An image that is stored
+/// colour after colour is covered once for each colour.
 struct DngGrid {
   DngParts at;
   int width = 0, height = 0;  // of one part [pixels]
   int across = 0;             // parts next to each other
+  std::size_t covering = 0;   // parts that cover the image once
   std::size_t count = 0;      // parts that the image needs
 
-  /// Returns the first column and row of part i.
-  int left(std::size_t i) const { return static_cast<int>(i % static_cast<std::size_t>(across)) * width; }
-  int top(std::size_t i) const { return static_cast<int>(i / static_cast<std::size_t>(across)) * height; }
+  /// Returns the first column and row of part i, and the number of its colour: 0 if it has all of them.
+  int left(std::size_t i) const { return static_cast<int>(i % covering % static_cast<std::size_t>(across)) * width; }
+  int top(std::size_t i) const { return static_cast<int>(i % covering / static_cast<std::size_t>(across)) * height; }
+  int plane(std::size_t i) const { return static_cast<int>(i / covering); }
 };
 
-/// Returns the grid of an image. Errors: parts without pixels, far larger than the image, too few or outside the file.
+/// Returns the grid of an image. Errors: parts without pixels, far larger than the image, too few or outside the file,
+/// or parts that share bytes.
 Result<DngGrid> dng_grid(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes);
 
 /// Returns the value of a tag that must be there and be an integer.
 Result<std::uint32_t> required_whole(const TiffDirectory& directory, TagName name);
+
+/// Returns whether an image is in lossless JPEG, in more than one strip.
+bool is_jpeg_in_strips(const TiffDirectory& directory);
+
+/// Returns whether a compression is Deflate, by one of its two numbers.
+bool is_deflate(std::uint32_t compression);
 
 /// Returns a compression's name for messages, "JPEG XL (52546)".
 std::string compression_name(std::uint32_t compression);

@@ -180,8 +180,10 @@ class Collector {
     }
     bytes_ += entry.values.size();
     ++tags_;
-    SourceTag tag{
-        entry.id, static_cast<std::uint16_t>(entry.type), entry.count, {entry.values.begin(), entry.values.end()}};
+    SourceTag tag{entry.id,
+                  static_cast<std::uint16_t>(entry.type),
+                  static_cast<std::uint32_t>(entry.count),
+                  {entry.values.begin(), entry.values.end()}};
     for (std::size_t at = 0; entry.big_endian && at + unit <= tag.values.size(); at += unit) {
       const auto first = tag.values.begin() + static_cast<std::ptrdiff_t>(at);
       std::reverse(first, first + static_cast<std::ptrdiff_t>(unit));

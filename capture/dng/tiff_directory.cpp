@@ -12,11 +12,23 @@ namespace {
 
 constexpr std::array<std::uint16_t, 4> raw_marks{42, 0x4F52, 0x5352, 0x55};  // TIFF; "RO" and "RS" of ORF; RW2
 
-constexpr std::size_t entry_bytes = 12;
+constexpr std::uint16_t big_tiff_mark = 43;
+constexpr std::uint64_t max_entries = 65535;  // of a directory, as in a classic TIFF
+
+/// The sizes of the parts of a directory.
+struct Layout {
+  std::size_t count_bytes, entry_bytes, offset_bytes;  // an offset or short values take the last bytes of an entry
+};
+constexpr Layout layout_of(bool is_big_tiff) { return is_big_tiff ? Layout{8, 20, 8} : Layout{2, 12, 4}; }
+
+/// Loads an offset, or the count of an entry's values.
+std::uint64_t load_offset(const std::byte* at, bool big_endian, bool is_big_tiff) {
+  return is_big_tiff ? load_u64(at, big_endian) : load_u32(at, big_endian);
+}
 
 /// Returns the size of one value, 0 for a type TIFF does not know.
 std::size_t value_bytes(TiffEntry::Type type) {
-  constexpr std::size_t bytes[] = {0, 1, 1, 2, 4, 8, 1, 1, 2, 4, 8, 4, 8, 4};
+  constexpr std::size_t bytes[] = {0, 1, 1, 2, 4, 8, 1, 1, 2, 4, 8, 4, 8, 4, 0, 0, 8, 8, 8};
   const auto index = static_cast<std::size_t>(type);
   return index < std::size(bytes) ? bytes[index] : 0;
 }
@@ -27,25 +39,28 @@ double quotient(double numerator, double denominator) {
                         : std::copysign(std::numeric_limits<double>::infinity(), numerator);
 }
 
-std::string plural(std::size_t count) { return std::to_string(count) + (count == 1 ? " value" : " values"); }
+std::string plural(std::uint64_t count) { return std::to_string(count) + (count == 1 ? " value" : " values"); }
 
 /// Reads an entry. One whose values lie outside the file is kept as such: whether that matters depends on its use.
-TiffEntry read_entry(std::span<const std::byte> file, const std::byte* at, bool big_endian) {
+TiffEntry read_entry(std::span<const std::byte> file, const std::byte* at, bool big_endian, bool is_big_tiff) {
+  const Layout layout = layout_of(is_big_tiff);
   TiffEntry entry;
   entry.id = load_u16(at, big_endian);
   entry.place = static_cast<std::size_t>(at - file.data());
   entry.type = static_cast<TiffEntry::Type>(load_u16(at + 2, big_endian));
-  entry.count = load_u32(at + 4, big_endian);
+  entry.count = load_offset(at + 4, big_endian, is_big_tiff);
   entry.big_endian = big_endian;
-  const std::uint64_t length = std::uint64_t{entry.count} * value_bytes(entry.type);
-  if (length <= 4) {
-    entry.values = {at + 8, static_cast<std::size_t>(length)};
+  const std::byte* const last = at + layout.entry_bytes - layout.offset_bytes;
+  if (entry.count > file.size()) return entry;
+  const std::size_t length = static_cast<std::size_t>(entry.count) * value_bytes(entry.type);
+  if (length <= layout.offset_bytes) {
+    entry.values = {last, length};
     entry.inside_file = true;
     return entry;
   }
-  const std::uint64_t offset = load_u32(at + 8, big_endian);
-  if (offset + length <= file.size()) {
-    entry.values = file.subspan(offset, length);
+  const std::uint64_t offset = load_offset(last, big_endian, is_big_tiff);
+  if (length <= file.size() && offset <= file.size() - length) {
+    entry.values = file.subspan(static_cast<std::size_t>(offset), length);
     entry.inside_file = true;
   }
   return entry;
@@ -63,12 +78,14 @@ std::uint32_t load_u32(const std::byte* at, bool big_endian) {
   return big_endian ? first << 16 | second : second << 16 | first;
 }
 
+std::uint64_t load_u64(const std::byte* at, bool big_endian) {
+  const std::uint64_t first = load_u32(at, big_endian), second = load_u32(at + 4, big_endian);
+  return big_endian ? first << 32 | second : second << 32 | first;
+}
+
 float load_f32(const std::byte* at, bool big_endian) { return std::bit_cast<float>(load_u32(at, big_endian)); }
 
-double load_f64(const std::byte* at, bool big_endian) {
-  const std::uint64_t first = load_u32(at, big_endian), second = load_u32(at + 4, big_endian);
-  return std::bit_cast<double>(big_endian ? first << 32 | second : second << 32 | first);
-}
+double load_f64(const std::byte* at, bool big_endian) { return std::bit_cast<double>(load_u64(at, big_endian)); }
 
 bool TiffEntry::is_numeric() const { return inside_file && value_bytes(type) > 0 && type != Type::ascii; }
 
@@ -99,6 +116,11 @@ double TiffEntry::number(std::size_t i) const {
       return load_f32(at, big_endian);
     case Type::f64:
       return load_f64(at, big_endian);
+    case Type::u64:
+    case Type::ifd64:
+      return static_cast<double>(load_u64(at, big_endian));
+    case Type::s64:
+      return static_cast<double>(static_cast<std::int64_t>(load_u64(at, big_endian)));
   }
   return std::numeric_limits<double>::quiet_NaN();
 }
@@ -192,26 +214,42 @@ std::optional<TiffFile> TiffFile::open_marked(std::span<const std::byte> bytes, 
   if (first != second || (first != 'I' && first != 'M')) return std::nullopt;
   const bool big_endian = first == 'M';
   const std::uint16_t mark = load_u16(bytes.data() + 2, big_endian);
+  if (mark == big_tiff_mark) {  // then the size of offsets, a zero, and the first offset
+    const bool is_good = bytes.size() >= 16 && load_u32(bytes.data() + 4, big_endian) == (big_endian ? 8U << 16U : 8U);
+    if (!is_good) return std::nullopt;
+    return TiffFile(bytes, big_endian, true, load_u64(bytes.data() + 8, big_endian));
+  }
   if (std::find(marks.begin(), marks.end(), mark) == marks.end()) return std::nullopt;
-  return TiffFile(bytes, big_endian, load_u32(bytes.data() + 4, big_endian));
+  return TiffFile(bytes, big_endian, false, load_u32(bytes.data() + 4, big_endian));
 }
 
-Result<TiffDirectory> TiffFile::directory(std::uint32_t offset) const {
+Result<TiffDirectory> TiffFile::directory(std::uint64_t offset) const {
   const auto outside = [offset] {
     return fail(ErrorCode::malformed, "the tag directory at byte " + std::to_string(offset) +
                                           " lies beyond the end of the file: it is truncated or damaged");
   };
-  if (std::uint64_t{offset} + 2 > bytes_.size()) return outside();
-  const std::size_t count = load_u16(bytes_.data() + offset, big_endian_);
-  const std::uint64_t end = std::uint64_t{offset} + 2 + count * entry_bytes;
-  if (end > bytes_.size()) return outside();
+  const Layout layout = layout_of(is_big_tiff_);
+  if (offset > bytes_.size() || bytes_.size() - offset < layout.count_bytes) return outside();
+  const std::byte* const start = bytes_.data() + offset;
+  const std::uint64_t count = is_big_tiff_ ? load_u64(start, big_endian_) : load_u16(start, big_endian_);
+  const std::size_t first = static_cast<std::size_t>(offset) + layout.count_bytes;
+  if (count > (bytes_.size() - first) / layout.entry_bytes) return outside();
+  if (count > max_entries) {
+    return fail(ErrorCode::malformed, "the tag directory at byte " + std::to_string(offset) + " has " +
+                                          std::to_string(count) + " tags: the file is damaged");
+  }
   TiffDirectory directory;
   directory.big_endian = big_endian_;
-  directory.entries.reserve(count);
+  directory.is_big_tiff = is_big_tiff_;
+  directory.entries.reserve(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < count; ++i) {
-    directory.entries.push_back(read_entry(bytes_, bytes_.data() + offset + 2 + i * entry_bytes, big_endian_));
+    const std::byte* const at = bytes_.data() + first + i * layout.entry_bytes;
+    directory.entries.push_back(read_entry(bytes_, at, big_endian_, is_big_tiff_));
   }
-  if (end + 4 <= bytes_.size()) directory.next = load_u32(bytes_.data() + end, big_endian_);
+  const std::size_t end = first + static_cast<std::size_t>(count) * layout.entry_bytes;
+  if (bytes_.size() - end >= layout.offset_bytes) {
+    directory.next = load_offset(bytes_.data() + end, big_endian_, is_big_tiff_);
+  }
   return directory;
 }
 

@@ -33,13 +33,16 @@ class TiffEntry {
     srational,
     f32,
     f64,
-    ifd
+    ifd,
+    u64 = 16,  // this and the next two: of BigTIFF
+    s64,
+    ifd64
   };
 
   std::uint16_t id = 0;
   std::size_t place = 0;  // offset of the entry in the file
   Type type = Type::byte;
-  std::uint32_t count = 0;
+  std::uint64_t count = 0;
   bool big_endian = false;
   bool inside_file = false;  // false: `values` is empty because they lie outside the file
   std::span<const std::byte> values;
@@ -57,8 +60,9 @@ class TiffEntry {
 class TiffDirectory {
  public:
   std::vector<TiffEntry> entries;
-  bool big_endian = false;  // of the file
-  std::uint32_t next = 0;   // offset of the next directory; 0: none
+  bool big_endian = false;   // of the file
+  bool is_big_tiff = false;  // of a file with offsets of 64 bits
+  std::uint64_t next = 0;    // offset of the next directory; 0: none
 
   /// Returns the entry of a tag; nullptr if there is none.
   const TiffEntry* find(TagName tag) const;
@@ -79,28 +83,29 @@ class TiffDirectory {
 /// A TIFF file held in memory, with its directories. Nothing is copied: `bytes` must outlive it and all it returns.
 class TiffFile {
  public:
-  /// Opens a TIFF; nullopt if the bytes do not begin as a classic (32-bit) TIFF.
+  /// Opens a TIFF; nullopt if the bytes begin neither as a classic (32-bit) TIFF nor as a BigTIFF (64-bit).
   static std::optional<TiffFile> open(std::span<const std::byte> bytes);
   /// Opens a TIFF, or a raw file that is one but for its mark: ORF and RW2.
   static std::optional<TiffFile> open_raw(std::span<const std::byte> bytes);
 
-  std::uint32_t first_directory() const { return first_directory_; }
+  std::uint64_t first_directory() const { return first_directory_; }
   /// Returns the directory at an offset; fails if it does not lie inside the file.
-  Result<TiffDirectory> directory(std::uint32_t offset) const;
+  Result<TiffDirectory> directory(std::uint64_t offset) const;
 
  private:
   static std::optional<TiffFile> open_marked(std::span<const std::byte> bytes, std::span<const std::uint16_t> marks);
-  TiffFile(std::span<const std::byte> bytes, bool big_endian, std::uint32_t first)
-      : bytes_(bytes), big_endian_(big_endian), first_directory_(first) {}
+  TiffFile(std::span<const std::byte> bytes, bool big_endian, bool is_big_tiff, std::uint64_t first)
+      : bytes_(bytes), big_endian_(big_endian), is_big_tiff_(is_big_tiff), first_directory_(first) {}
 
   std::span<const std::byte> bytes_;
-  bool big_endian_;
-  std::uint32_t first_directory_;
+  bool big_endian_, is_big_tiff_;
+  std::uint64_t first_directory_;
 };
 
 /// Each loads an unsigned or floating-point number in a stated byte order. Precondition: enough bytes.
 std::uint16_t load_u16(const std::byte* at, bool big_endian);
 std::uint32_t load_u32(const std::byte* at, bool big_endian);
+std::uint64_t load_u64(const std::byte* at, bool big_endian);
 float load_f32(const std::byte* at, bool big_endian);
 double load_f64(const std::byte* at, bool big_endian);
 

@@ -11,11 +11,11 @@
 #include "capture/decoder/decoder_process.h"
 #include "capture/dng/dng_colour.h"
 #include "capture/dng/dng_file.h"
-#include "capture/dng/dng_floats.h"
 #include "capture/dng/dng_frame.h"
 #include "capture/dng/dng_jpeg_xl.h"
 #include "capture/dng/dng_levels.h"
 #include "capture/dng/dng_lossy.h"
+#include "capture/dng/dng_rows.h"
 #include "capture/dng/dng_tags.h"
 #include "capture/dng/source_tags.h"
 #include "capture/dng/tiff_directory.h"
@@ -92,21 +92,11 @@ bool is_jpeg(std::span<const std::byte> bytes) {
   return bytes.size() > 2 && bytes[0] == std::byte{0xFF} && bytes[1] == std::byte{0xD8} && bytes[2] == std::byte{0xFF};
 }
 
-/// Returns whether a file begins as BigTIFF, which has offsets of 64 bits.
-bool is_big_tiff(std::span<const std::byte> bytes) {
-  using std::string_view_literals::operator""sv;
-  return text_of(bytes).starts_with("II\x2B\0"sv) || text_of(bytes).starts_with("MM\0\x2B"sv);
-}
-
 /// Returns the error of a file that is not a DNG and that the decoder rejected. JPEG files can hold a raw after the
 /// image, and most raws begin as TIFF: only now is it known that they are ordinary images.
 Error not_decoded(std::span<const std::byte> bytes, Error error) {
   if (is_jpeg(bytes)) return {ErrorCode::unsupported, "this is a JPEG picture, not a raw file", {}};
   if (is_printable(text_of(bytes))) return {ErrorCode::unsupported, "this is text, not a raw file", {}};
-  if (is_big_tiff(bytes)) {
-    return {
-        ErrorCode::unsupported, "this is a BigTIFF file, which is not supported: convert it to a DNG below 4 GB", {}};
-  }
   if (error.code == ErrorCode::unsupported && TiffFile::open(bytes)) {
     error.message = "this is a TIFF picture, or a raw file that is damaged or unknown to " + decoder_name();
   }
@@ -125,13 +115,28 @@ std::vector<const TiffEntry*> harmful_tags(const DngFile& dng) {
   return found;
 }
 
-Result<DecodedRaw> decode_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits) {
+void set_tag(const TiffEntry& entry, std::uint16_t id, std::vector<std::byte>& file) {
+  file[entry.place + (entry.big_endian ? 0 : 1)] = static_cast<std::byte>(id >> 8);
+  file[entry.place + (entry.big_endian ? 1 : 0)] = static_cast<std::byte>(id & 255);
+}
+
+/// Presents strips to LibRaw as tiles: of strips it decodes lossless JPEG in the first one only. It takes tiles without
+/// TileWidth to be as wide as the image.
+void as_tiles_of_libraw(const TiffDirectory& strips, std::vector<std::byte>& file) {
+  set_tag(*strips.find(tag::strip_offsets), tag::tile_offsets.id, file);
+  set_tag(*strips.find(tag::strip_byte_counts), tag::tile_byte_counts.id, file);
+  set_tag(*strips.find(tag::rows_per_strip), tag::tile_length.id, file);
+}
+
+Result<DecodedRaw> decode_dng(const DngFile& dng, const TiffDirectory& raw_image, std::span<const std::byte> bytes,
+                              const ReadLimits& limits) {
   const auto harmful = harmful_tags(dng);
-  if (harmful.empty()) return decode_contained(bytes, limits);
-  std::vector<std::byte> without(bytes.begin(), bytes.end());
-  for (const TiffEntry* entry : harmful)
-    std::fill_n(without.begin() + static_cast<std::ptrdiff_t>(entry->place), 2, std::byte{0});
-  return decode_contained(without, limits);
+  const bool in_strips = is_jpeg_in_strips(raw_image);
+  if (harmful.empty() && !in_strips) return decode_contained(bytes, limits);
+  std::vector<std::byte> changed(bytes.begin(), bytes.end());
+  for (const TiffEntry* entry : harmful) set_tag(*entry, 0, changed);
+  if (in_strips) as_tiles_of_libraw(raw_image, changed);
+  return decode_contained(changed, limits);
 }
 
 Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits,
@@ -144,22 +149,32 @@ Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, 
                                           std::to_string(image.height) + " pixels is over the limit of " +
                                           std::to_string(limits.max_pixels) + " pixels");
   }
-  if (image.is_lossy) {
-    auto codes = decode_lossy_image(bytes, *described->directory, image);
-    if (!codes) return pass_on(codes);
-    return complete_linearized_dng(dng, *std::move(described), *std::move(codes), use);
+  const TiffDirectory& raw_image = *described->directory;
+  switch (image.decoder) {
+    case DngDecoder::lossy_jpeg: {
+      auto codes = decode_lossy_image(bytes, raw_image, image);
+      if (!codes) return pass_on(codes);
+      return complete_linearized_dng(dng, *std::move(described), *std::move(codes), use);
+    }
+    case DngDecoder::jpeg_xl: {
+      auto codes = decode_jpeg_xl_image(bytes, raw_image, image, limits);
+      if (!codes) return pass_on(codes);
+      return complete_linearized_dng(dng, *std::move(described), *std::move(codes), use);
+    }
+    case DngDecoder::rows: {
+      if (image.is_float) {
+        auto samples = decode_float_image(bytes, raw_image, image);
+        if (!samples) return pass_on(samples);
+        return complete_float_dng(dng, *std::move(described), *std::move(samples), use);
+      }
+      auto codes = decode_code_image(bytes, raw_image, image);
+      if (!codes) return pass_on(codes);
+      return complete_code_dng(dng, *std::move(described), *std::move(codes), use);
+    }
+    case DngDecoder::libraw:
+      break;
   }
-  if (image.is_jpeg_xl) {
-    auto codes = decode_jpeg_xl_image(bytes, *described->directory, image, limits);
-    if (!codes) return pass_on(codes);
-    return complete_linearized_dng(dng, *std::move(described), *std::move(codes), use);
-  }
-  if (image.is_float) {
-    auto samples = decode_float_image(bytes, *described->directory, image);
-    if (!samples) return pass_on(samples);
-    return complete_float_dng(dng, *std::move(described), *std::move(samples), use);
-  }
-  auto decoded = decode_dng(dng, bytes, limits);
+  auto decoded = decode_dng(dng, raw_image, bytes, limits);
   if (!decoded) return pass_on(decoded);
   return complete_dng(dng, *std::move(described), bytes.size(), *std::move(decoded), use);
 }

@@ -1,14 +1,10 @@
 #include "isp/codec/float_rows.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
 #include <cstdint>
-#include <limits>
-#include <new>
 
 namespace lowlux::isp {
 namespace {
@@ -53,78 +49,30 @@ void add_differences(std::span<std::byte> row, std::size_t step) {
 
 }  // namespace
 
-struct FloatRows::Inflater {
-  Inflater() {
-    if (inflateInit(&stream) != Z_OK) throw std::bad_alloc();
-  }
-  Inflater(const Inflater&) = delete;
-  Inflater& operator=(const Inflater&) = delete;
-  ~Inflater() { inflateEnd(&stream); }
-
-  void open(std::span<const std::byte> part) {
-    inflateReset(&stream);
-    stream.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(part.data()));  // zlib only reads it
-    stream.avail_in = static_cast<uInt>(std::min<std::size_t>(part.size(), std::numeric_limits<uInt>::max()));
-  }
-  bool fill(std::span<std::byte> out) {
-    stream.next_out = reinterpret_cast<Bytef*>(out.data());
-    stream.avail_out = static_cast<uInt>(out.size());
-    const int outcome = inflate(&stream, Z_SYNC_FLUSH);
-    return (outcome == Z_OK || outcome == Z_STREAM_END) && stream.avail_out == 0;
-  }
-
-  /// Reads on, with space for a byte, so that a stream that ends is read to its checksum.
-  bool is_at_end() {
-    Bytef more = 0;
-    stream.next_out = &more;
-    stream.avail_out = 1;
-    const int outcome = inflate(&stream, Z_SYNC_FLUSH);
-    return outcome == Z_STREAM_END || outcome == Z_BUF_ERROR;  // the latter: it ends without a checksum
-  }
-
-  z_stream stream{};
-};
-
-FloatRows::FloatRows(const FloatStorage& storage, std::size_t row_samples)
-    : storage_(storage), row_samples_(row_samples) {
+FloatRows::FloatRows(const RowStorage& storage, std::size_t row_samples)
+    : storage_(storage), row_samples_(row_samples), rows_(storage.deflated, row_bytes(storage.bits, row_samples)) {
   assert(storage.bits == 16 || storage.bits == 24 || storage.bits == 32);
-  assert(row_samples > 0 && storage.predictor_step >= 0 && (storage.deflated || storage.predictor_step == 0));
-  if (!storage.deflated) return;
-  inflater_ = std::make_unique<Inflater>();
-  inflated_.resize(row_samples * static_cast<std::size_t>(storage.bits / 8));
-}
-
-FloatRows::~FloatRows() = default;
-
-void FloatRows::open(std::span<const std::byte> part) {
-  rest_ = part;
-  if (inflater_) inflater_->open(part);
+  assert(storage.predictor_step >= 0 && (storage.deflated || storage.predictor_step == 0));
 }
 
 bool FloatRows::next(std::span<float> row) {
   assert(row.size() == row_samples_);
+  auto bytes = rows_.next();
+  if (!bytes) return false;
   const auto sample_bytes = static_cast<std::size_t>(storage_.bits / 8);
-  const std::size_t row_bytes = row_samples_ * sample_bytes;
   const bool predicted = storage_.predictor_step > 0;
-  if (inflater_ ? !inflater_->fill(inflated_) : rest_.size() < row_bytes) return false;
-  if (predicted) add_differences(inflated_, static_cast<std::size_t>(storage_.predictor_step));
+  if (predicted) {
+    restored_.assign(bytes->begin(), bytes->end());
+    add_differences(restored_, static_cast<std::size_t>(storage_.predictor_step));
+    bytes = restored_;
+  }
   std::array<std::size_t, 4> offset{};
   for (std::size_t weight = 0; weight < sample_bytes; ++weight) {
     const std::size_t place = storage_.big_endian ? weight : sample_bytes - 1 - weight;
     offset[weight] = predicted ? weight * row_samples_ : place;
   }
-  gather(inflater_ ? inflated_.data() : rest_.data(), predicted ? 1 : sample_bytes,
-         std::span(offset).first(sample_bytes), storage_.bits, row);
-  if (!inflater_) rest_ = rest_.subspan(row_bytes);
+  gather(bytes->data(), predicted ? 1 : sample_bytes, std::span(offset).first(sample_bytes), storage_.bits, row);
   return true;
-}
-
-bool FloatRows::ends_within(int rows) {
-  if (!inflater_) return true;
-  for (int i = 0; i < rows; ++i) {
-    if (!inflater_->fill(inflated_)) break;
-  }
-  return inflater_->is_at_end();
 }
 
 }  // namespace lowlux::isp

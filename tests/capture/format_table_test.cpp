@@ -13,6 +13,7 @@
 #include "capture/decoder/decoder_name.h"
 #include "tests/capture/read_built.h"
 #include "tests/capture/x_trans_colours.h"
+#include "tests/support/dng/code_dng.h"
 #include "tests/support/dng/float_dng.h"
 #include "tests/support/dng/jpeg_xl.h"
 
@@ -56,6 +57,17 @@ std::vector<std::byte> floats(int bits, bool deflate, int predictor) {
   return test::float_dng(zeros, {.bits = bits, .deflate = deflate, .predictor = predictor}).build();
 }
 
+DngBuilder stored(const test::CodeStore& how) {
+  Plane<std::uint16_t> zeros(64 * how.samples, 64);
+  std::fill_n(zeros.data(), zeros.size(), std::uint16_t{0});
+  return test::code_dng(zeros, how);
+}
+
+std::vector<std::byte> in_big_tiff(DngBuilder dng) {
+  dng.big_tiff = true;
+  return dng.build();
+}
+
 #ifdef LOWLUX_WITH_JPEG_XL
 std::vector<std::byte> in_jpeg_xl(int samples) {
   DngBuilder dng = plain(samples, 12);
@@ -72,6 +84,18 @@ std::vector<Format> stored_formats() {
     out.push_back(
         {"DNG, Bayer, " + std::to_string(bits) + " bits, uncompressed", [bits] { return plain(1, bits).build(); }});
   }
+  out.push_back({"DNG, Bayer, uncompressed, tiles", [] { return stored({.tile_width = 32, .rows = 32}).build(); }});
+  out.push_back({"DNG, Bayer, uncompressed, strips apart", [] {
+                   DngBuilder dng = stored({.rows = 16});
+                   dng.part_gap = 2;
+                   return dng.build();
+                 }});
+  out.push_back({"DNG, Bayer, Deflate, predictor 2", [] { return stored({.deflate = true, .predictor = 2}).build(); }});
+  out.push_back({"DNG, Bayer, lossless JPEG, strips", [] {
+                   DngBuilder dng = plain(1, 14, DngStorage::lossless_jpeg);
+                   dng.rows_per_strip = 16;
+                   return dng.build();
+                 }});
   out.push_back(
       {"DNG, Bayer, lossless JPEG, one strip", [] { return plain(1, 14, DngStorage::lossless_jpeg).build(); }});
   out.push_back(
@@ -93,6 +117,11 @@ std::vector<Format> stored_formats() {
                    return dng.set(33422, Tag::numbers(TagType::byte, colours)).build();
                  }});
   out.push_back({"DNG, LinearRaw, uncompressed", [] { return plain(3).build(); }});
+  out.push_back({"DNG, LinearRaw, uncompressed, colour after colour",
+                 [] { return stored({.samples = 3, .planar = true}).build(); }});
+  out.push_back(
+      {"DNG, LinearRaw, 8 bits, Deflate", [] { return stored({.bits = 8, .samples = 3, .deflate = true}).build(); }});
+  out.push_back({"DNG, BigTIFF, uncompressed", [] { return in_big_tiff(plain()); }});
   out.push_back({"DNG, LinearRaw, lossless JPEG", [] { return plain(3, 16, DngStorage::lossless_jpeg).build(); }});
 #ifdef LOWLUX_WITH_JPEG_XL
   out.push_back({"DNG, Bayer, JPEG XL", [] { return in_jpeg_xl(1); }});
@@ -105,16 +134,8 @@ std::vector<Format> stored_formats() {
 }
 
 std::vector<Format> other_formats() {
-  return {{"DNG, Bayer, uncompressed, tiles",
-           [] {
-             DngBuilder dng = plain();
-             dng.tile_width = dng.tile_height = 32;
-             dng.stored_parts.assign(4, std::vector<std::byte>(std::size_t{32} * 32 * 2));
-             dng.parts_are_tiles = true;
-             return dng.build();
-           }},
-          {"DNG, Bayer, lossy JPEG", [] { return with(plain(1, 8), 259, {34892}); }},
-          {"DNG, integers, Deflate", [] { return with(plain(), 259, {8}); }},
+  return {{"DNG, Bayer, lossy JPEG", [] { return with(plain(1, 8), 259, {34892}); }},
+          {"DNG, BigTIFF, lossless JPEG", [] { return in_big_tiff(plain(1, 14, DngStorage::lossless_jpeg)); }},
           {"DNG, VC-5 (GoPro GPR)", [] { return file_of("gopro_hero6_GOPR0024.gpr"); }},
           {"DNG, mosaic of 6 x 6 sites other than X-Trans",
            [] {
@@ -134,16 +155,12 @@ std::vector<Format> other_formats() {
            }},
           {"DNG, mosaic that is not rectangular", [] { return with(plain(), 50711, {2}); }},
           {"DNG, integers of 32 bits", [] { return with(plain(), 258, {32}); }},
-          {"DNG, LinearRaw, colour after colour", [] { return with(plain(3), 284, {2}); }},
+          {"DNG, LinearRaw, lossless JPEG, colour after colour",
+           [] { return with(plain(3, 16, DngStorage::lossless_jpeg), 284, {2}); }},
           {"Kodak C603, YCbCr without a header", [] { return dump(9116448); }},
-          {"BigTIFF",
-           [] {
-             std::vector<std::byte> file = dump(1000);
-             for (const int at : {0, 1, 2, 3}) file[at] = std::byte{static_cast<unsigned char>("II\x2B\0"[at])};
-             return file;
-           }},
           {"text", [] { return dump(1000); }},
-          {"TIFF image", [] { return with(plain(3).remove(50706).remove(50707), 262, {2}); }}};
+          {"TIFF image", [] { return with(plain(3).remove(50706).remove(50707), 262, {2}); }},
+          {"BigTIFF image", [] { return in_big_tiff(plain(3).remove(50706).remove(50707)); }}};
 }
 
 /// Returns a row: decoded with its layout, or refused with the reason.

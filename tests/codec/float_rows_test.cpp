@@ -24,7 +24,7 @@ std::vector<std::byte> stored(const std::vector<std::uint32_t>& patterns, std::s
   return how.deflate ? test::deflated(out) : out;
 }
 
-FloatStorage storage_of(const FloatStore& how) {
+RowStorage storage_of(const FloatStore& how) {
   const int factor = how.predictor == 3 ? 1 : how.predictor == 34894 ? 2 : how.predictor == 34895 ? 4 : 0;
   return {how.bits, how.deflate, factor * how.samples, how.big_endian};
 }

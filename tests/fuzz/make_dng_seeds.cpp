@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/dng/code_dng.h"
 #include "tests/support/dng/dng_builder.h"
 #include "tests/support/dng/float_dng.h"
 
@@ -60,6 +61,24 @@ DngBuilder everything() {
   return dng;
 }
 
+/// Adds integers in strips and tiles, deflated, colour after colour, and in BigTIFFs.
+void add_stored_codes(std::vector<std::pair<std::string, DngBuilder>>& all) {
+  const CodeStore stores[] = {{.bits = 10, .rows = 7},
+                              {.bits = 12, .samples = 3, .tile_width = 16, .rows = 16},
+                              {.bits = 8, .deflate = true, .predictor = 2, .rows = 9},
+                              {.deflate = true, .predictor = 34893, .tile_width = 16, .rows = 16, .big_endian = true},
+                              {.bits = 14, .samples = 3, .rows = 11, .planar = true}};
+  for (const CodeStore& how : stores) {
+    Plane<std::uint16_t> codes(26 * how.samples, 24);
+    for (std::size_t i = 0; i < codes.size(); ++i) codes.data()[i] = static_cast<std::uint16_t>(i * 37 % 251);
+    DngBuilder dng = code_dng(codes, how);
+    dng.part_gap = 1;
+    all.emplace_back("codes" + std::to_string(all.size()), dng);
+    dng.big_tiff = true;
+    all.emplace_back("big_codes" + std::to_string(all.size()), dng);
+  }
+}
+
 std::vector<std::pair<std::string, DngBuilder>> seeds() {
   std::vector<std::pair<std::string, DngBuilder>> all;
   for (const int bits : {8, 10, 16}) all.emplace_back("plain" + std::to_string(bits), plain(bits));
@@ -67,6 +86,10 @@ std::vector<std::pair<std::string, DngBuilder>> seeds() {
   DngBuilder jpeg = plain(14);
   jpeg.storage = DngStorage::lossless_jpeg;
   all.emplace_back("jpeg", jpeg);
+  DngBuilder jpeg_strips = jpeg;
+  jpeg_strips.rows_per_strip = 7;
+  all.emplace_back("jpeg_strips", jpeg_strips);
+  add_stored_codes(all);
   DngBuilder tiles = jpeg;
   tiles.storage = DngStorage::tiled_lossless_jpeg;
   all.emplace_back("tiles", tiles);

@@ -53,7 +53,13 @@ std::vector<std::vector<std::byte>> image_parts(const DngBuilder& dng) {
   if (!dng.stored_parts.empty()) return dng.stored_parts;
   const std::vector<std::uint16_t> pixels = dng.pixels.empty() ? ramp(dng) : dng.pixels;
   std::vector<std::vector<std::byte>> parts;
-  if (dng.storage == DngStorage::lossless_jpeg) return {jpeg_part(dng, pixels, 0, 0, dng.width, dng.height)};
+  if (dng.storage == DngStorage::lossless_jpeg) {
+    const int strip = dng.rows_per_strip > 0 ? dng.rows_per_strip : dng.height;
+    for (int y = 0; y < dng.height; y += strip) {
+      parts.push_back(jpeg_part(dng, pixels, 0, y, dng.width, std::min(strip, dng.height - y)));
+    }
+    return parts;
+  }
   if (dng.storage == DngStorage::tiled_lossless_jpeg) {
     for (int y = 0; y < dng.height; y += dng.tile_height) {
       for (int x = 0; x < dng.width; x += dng.tile_width) {
@@ -157,14 +163,25 @@ DngBuilder& DngBuilder::remove(std::uint16_t id) {
   return *this;
 }
 
+std::vector<double> DngBuilder::part_offsets(const Parts& parts, std::size_t data) const {
+  std::vector<double> offsets(parts.size());
+  auto next = static_cast<double>(data);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::size_t part = parts_reversed ? parts.size() - 1 - i : i;
+    offsets[part] = next;
+    next += static_cast<double>(parts[part].size() + static_cast<std::size_t>(part_gap));
+  }
+  return offsets;
+}
+
 DngBuilder::Directories DngBuilder::directories(const Parts& parts, const Offsets& at) const {
   Directories out;
-  std::vector<double> offsets, sizes;
+  const std::vector<double> offsets = part_offsets(parts, at.data);
+  std::vector<double> sizes;
   auto next = static_cast<double>(at.data);
   for (const auto& part : parts) {
-    offsets.push_back(next);
     sizes.push_back(static_cast<double>(part.size()));
-    next += static_cast<double>(part.size());
+    next += static_cast<double>(part.size() + static_cast<std::size_t>(part_gap));
   }
   add_image_tags(*this, offsets, sizes, raw_in_sub_ifd ? out.raw : out.main);
   add_camera_tags(*this, out.main);
@@ -188,22 +205,30 @@ std::vector<std::byte> DngBuilder::build() const {
   const Parts parts = image_parts(*this);
   Offsets at;
   std::vector<std::byte> main, exif, raw;
+  const std::size_t header = big_tiff ? 16 : 8;
   // The first round finds the sizes of the directories, the second writes them with the offsets that follow.
   for (int round = 0; round < 2; ++round) {
     const Directories all = directories(parts, at);
-    main = encode_directory(all.main, 8, big_endian);
-    at.exif = 8 + main.size();
-    if (!all.exif.empty()) exif = encode_directory(all.exif, at.exif, big_endian);
+    main = encode_directory(all.main, header, big_endian, big_tiff);
+    at.exif = header + main.size();
+    if (!all.exif.empty()) exif = encode_directory(all.exif, at.exif, big_endian, big_tiff);
     at.raw = at.exif + exif.size();
-    if (raw_in_sub_ifd) raw = encode_directory(all.raw, at.raw, big_endian);
+    if (raw_in_sub_ifd) raw = encode_directory(all.raw, at.raw, big_endian, big_tiff);
     at.data = at.raw + raw.size();
   }
   ByteWriter file(big_endian);
   file.append(std::vector<std::byte>(2, big_endian ? std::byte{'M'} : std::byte{'I'}));
-  file.number(42, 2);
-  file.number(8, 4);
+  file.number(big_tiff ? 43 : 42, 2);
+  if (big_tiff) {
+    file.number(8, 2);
+    file.number(0, 2);
+  }
+  file.number(header, static_cast<int>(header / 2));
   for (const auto* directory : {&main, &exif, &raw}) file.append(*directory);
-  for (const auto& part : parts) file.append(part);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    file.append(parts[parts_reversed ? parts.size() - 1 - i : i]);
+    file.append(std::vector<std::byte>(static_cast<std::size_t>(part_gap), std::byte{0xA5}));
+  }
   if (raw_in_sub_ifd) file.append(std::vector<std::byte>(48, std::byte{128}));
   return file.out;
 }

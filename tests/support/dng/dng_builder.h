@@ -37,6 +37,9 @@ struct DngBuilder {
   int rows_per_strip = 0;                            // 0: one strip
   std::vector<std::vector<std::byte>> stored_parts;  // strips or tiles as stored, instead of pixels and storage
   bool parts_are_tiles = false;
+  int part_gap = 0;             // bytes between strips or tiles
+  bool parts_reversed = false;  // the last strip or tile comes first in the file
+  bool big_tiff = false;        // with offsets of 64 bits
   bool big_endian = false;
   bool raw_in_sub_ifd = false;  // a small RGB preview comes first, the raw image is its SubIFD
 
@@ -55,6 +58,7 @@ struct DngBuilder {
   struct Offsets {
     std::size_t exif = 0, raw = 0, data = 0;
   };
+  std::vector<double> part_offsets(const Parts& parts, std::size_t data) const;
   Directories directories(const Parts& parts, const Offsets& at) const;
 
   std::map<std::uint16_t, Tag> set_;

@@ -33,6 +33,9 @@ std::vector<std::byte> encoded(const Tag& tag, bool big_endian) {
       case TagType::f32:
         writer.number(std::bit_cast<std::uint32_t>(static_cast<float>(value)), 4);
         break;
+      case TagType::u64:
+        writer.number(whole(value), 8);
+        break;
       case TagType::f64:
         writer.number(std::bit_cast<std::uint64_t>(value), 8);
         break;
@@ -66,25 +69,28 @@ Tag Tag::text(const char* text) {
 
 Tag Tag::opaque(std::vector<std::byte> bytes) { return {TagType::undefined, {}, std::move(bytes)}; }
 
-std::vector<std::byte> encode_directory(const TagDirectory& directory, std::size_t offset, bool big_endian) {
+std::vector<std::byte> encode_directory(const TagDirectory& directory, std::size_t offset, bool big_endian,
+                                        bool big_tiff) {
   ByteWriter entries(big_endian), values(big_endian);
-  const std::size_t values_offset = offset + 2 + directory.size() * 12 + 4;
-  entries.number(directory.size(), 2);
+  const int word = big_tiff ? 8 : 4;  // bytes of a count or an offset
+  const std::size_t count_bytes = big_tiff ? 8 : 2;
+  const std::size_t values_offset = offset + count_bytes + directory.size() * (4 + 2 * word) + word;
+  entries.number(directory.size(), static_cast<int>(count_bytes));
   for (const auto& [id, tag] : directory) {
     std::vector<std::byte> bytes = encoded(tag, big_endian);
     entries.number(id, 2);
     entries.number(static_cast<std::uint16_t>(tag.type), 2);
-    entries.number(tag.bytes.empty() ? tag.values.size() : bytes.size(), 4);
-    if (bytes.size() <= 4) {
-      bytes.resize(4);
+    entries.number(tag.bytes.empty() ? tag.values.size() : bytes.size(), word);
+    if (bytes.size() <= static_cast<std::size_t>(word)) {
+      bytes.resize(word);
       entries.append(bytes);
     } else {
-      entries.number(values_offset + values.out.size(), 4);
+      entries.number(values_offset + values.out.size(), word);
       values.append(bytes);
       if (values.out.size() % 2 != 0) values.out.push_back(std::byte{0});
     }
   }
-  entries.number(0, 4);
+  entries.number(0, word);
   entries.append(values.out);
   if (entries.out.size() % 2 != 0) entries.out.push_back(std::byte{0});
   return entries.out;

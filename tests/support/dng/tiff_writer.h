@@ -21,7 +21,8 @@ enum class TagType : std::uint16_t {
   s32,
   srational,
   f32,
-  f64
+  f64,
+  u64 = 16  // of BigTIFF
 };
 
 /// Holds one tag: its values as whole numbers (or n/d pairs, or floating point). Whatever the type states is written,
@@ -58,8 +59,10 @@ class ByteWriter {
   bool big_endian_;
 };
 
-/// Writes a directory that begins at byte `offset`, with its longer values behind it.
-std::vector<std::byte> encode_directory(const TagDirectory& directory, std::size_t offset, bool big_endian);
+/// Writes a directory that begins at byte `offset`, with its longer values behind it. Offsets and counts have 32 bits,
+/// in a BigTIFF 64.
+std::vector<std::byte> encode_directory(const TagDirectory& directory, std::size_t offset, bool big_endian,
+                                        bool big_tiff = false);
 
 /// Appends a big-endian number, for opcode lists.
 void append_u32(std::vector<std::byte>& out, std::uint32_t value);

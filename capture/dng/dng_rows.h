@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "capture/dng/dng_storage.h"
+#include "capture/dng/tiff_directory.h"
+#include "isp/base/plane.h"
+#include "isp/base/result.h"
+
+/// Images whose strips or tiles are uncompressed or deflated are read here: integers of 8 to 16 bits that LibRaw would
+/// misplace or not decode (is_for_libraw), and floating-point numbers of 16, 24 and 32 bits, which LibRaw converts to
+/// 14-bit codes. Predictors, and images stored colour after colour, are supported.
+namespace lowlux::capture {
+
+/// Returns the error of an image whose storage is not supported or contradicts itself, or whose data are too short for
+/// its pixels. It allocates no memory for pixels.
+Result<void> check_row_image(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes);
+
+/// Returns whether LibRaw 0.20 reads this uncompressed image of integers: row after row without a gap, in a classic
+/// TIFF, 22 pixels wide and high or more, and not in tiles.
+bool is_for_libraw(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes);
+
+/// Both decode an image that check_row_image accepts, to height x (width * samples).
+/// @param file  all bytes
+/// @return codes as stored, or floats of any values, NaN included
+/// Errors: those of check_row_image; damaged or truncated streams.
+Result<Plane<std::uint16_t>> decode_code_image(std::span<const std::byte> file, const TiffDirectory& directory,
+                                               const DngImage& image);
+Result<Plane<float>> decode_float_image(std::span<const std::byte> file, const TiffDirectory& directory,
+                                        const DngImage& image);
+
+}  // namespace lowlux::capture

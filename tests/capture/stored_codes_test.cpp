@@ -1,0 +1,297 @@
+// DNGs of integers in strips and tiles, deflated, colour after colour, and in BigTIFFs: each is read as the same
+// samples in one strip. Broken ones are one clear line and take no memory.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "isp/base/source_tags.h"
+#include "tests/capture/read_built.h"
+#include "tests/support/dng/code_dng.h"
+#include "tests/support/dng/float_dng.h"
+#include "tests/support/peak_memory.h"
+
+namespace lowlux::capture {
+namespace {
+
+using test::code_dng;
+using test::CodeStore;
+using test::DngBuilder;
+using test::DngStorage;
+using test::has;
+using test::Tag;
+using test::TagType;
+
+constexpr unsigned seed = 20261;
+
+class Draw {
+ public:
+  explicit Draw(unsigned index) : random_(seed + index) {}
+  int below(int end) { return static_cast<int>(random_() % static_cast<unsigned>(end)); }
+  bool coin() { return below(2) == 1; }
+  int log_uniform(int least, int most) {
+    const double unit = (static_cast<double>(random_()) + 0.5) / 4294967296.0;
+    return std::clamp(static_cast<int>(least * std::pow((most + 1.0) / least, unit)), least, most);
+  }
+  Plane<std::uint16_t> codes(int width, int height, int bits) {
+    Plane<std::uint16_t> out(width, height);
+    for (std::size_t i = 0; i < out.size(); ++i) out.data()[i] = static_cast<std::uint16_t>(random_() >> (32 - bits));
+    return out;
+  }
+
+ private:
+  std::mt19937 random_;
+};
+
+std::vector<std::uint16_t> all_of(const Plane<std::uint16_t>& codes) {
+  return {codes.data(), codes.data() + codes.size()};
+}
+
+struct Drawn {
+  Plane<std::uint16_t> codes;
+  CodeStore how;
+  DngBuilder dng;
+  std::string text;
+};
+
+/// Draws sides log-uniformly from 1 to 5000 for up to 200,000 pixels, and up to about 1000 strips or tiles.
+Drawn drawn(unsigned index) {
+  Draw draw(index);
+  CodeStore how;
+  how.samples = draw.coin() ? 1 : 3;
+  how.deflate = draw.coin();
+  how.bits = how.deflate ? 8 + 8 * draw.below(2) : std::array{8, 10, 12, 14, 16, 9, 15}[draw.below(7)];
+  how.predictor = how.deflate ? std::array{1, 2, 34892, 34893}[draw.below(4)] : 1;
+  how.planar = how.samples == 3 && draw.coin();
+  how.big_endian = draw.coin();
+  const int longer = draw.log_uniform(1, 5000), other = draw.log_uniform(1, std::min(5000, 200'000 / longer));
+  const int width = index % 2 == 0 ? longer : other, height = index % 2 == 0 ? other : longer;
+  if (draw.coin()) how.tile_width = draw.log_uniform(1 + width / 32, std::min(4096, 2 * width + 16));
+  how.rows = draw.log_uniform(1 + height / 32, std::min(4096, 2 * height));
+  Drawn out{draw.codes(width * how.samples, height, how.bits), how, {}, {}};
+  out.dng = code_dng(out.codes, how);
+  out.dng.part_gap = draw.below(3);
+  out.dng.parts_reversed = draw.coin();
+  out.dng.big_tiff = draw.below(4) == 0;
+  out.text = std::to_string(width) + " x " + std::to_string(height) + " x " + std::to_string(how.samples) + ", " +
+             std::to_string(how.bits) + " bits, predictor " + std::to_string(how.predictor) +
+             (how.deflate ? ", deflated" : "") + (how.planar ? ", planar" : "") +
+             (how.big_endian ? ", big endian" : "") + ", tiles of " + std::to_string(how.tile_width) + ", rows " +
+             std::to_string(how.rows) + ", seed " + std::to_string(seed + index);
+  return out;
+}
+
+TEST(StoredCodes, EveryStorageIsReadAsTheSameSamplesInOneStrip) {
+  int strips_compared = 0;
+  for (unsigned i = 0; i < 120; ++i) {
+    const Drawn now = drawn(i);
+    const RawFrame frame = test::read_built(now.dng);
+    ASSERT_EQ(frame.raw.dn.width(), now.codes.width()) << now.text;
+    ASSERT_EQ(test::samples_of(frame), all_of(now.codes)) << now.text;
+    EXPECT_TRUE(frame.warnings.empty()) << now.text;
+    const CodeStore one{.bits = now.how.bits, .samples = now.how.samples, .big_endian = now.how.big_endian};
+    const RawFrame strip = test::read_built(code_dng(now.codes, one));
+    ASSERT_EQ(test::samples_of(strip), test::samples_of(frame)) << now.text;
+    EXPECT_EQ(strip.raw.white_dn, frame.raw.white_dn);
+    EXPECT_EQ(strip.raw.layout, frame.raw.layout);
+    ++strips_compared;
+  }
+  EXPECT_EQ(strips_compared, 120);
+}
+
+TEST(StoredCodes, LosslessJpegInStripsIsReadAsInOne) {
+  for (unsigned i = 0; i < 60; ++i) {
+    Draw draw(1000 + i);
+    DngBuilder dng;
+    dng.samples = draw.coin() ? 1 : 3;
+    dng.bits = 8 + draw.below(9);
+    dng.big_endian = draw.coin();
+    dng.width = draw.log_uniform(22, 1500);
+    dng.height = draw.log_uniform(22, std::max(22, std::min(1500, 60'000 / dng.width)));
+    dng.jpeg_components = dng.width % 2 == 0 && draw.coin() ? 2 : 1;
+    dng.storage = DngStorage::lossless_jpeg;
+    dng.raw_in_sub_ifd = draw.coin();
+    const std::vector<std::uint16_t> whole = test::samples_of(test::read_built(dng));
+    dng.rows_per_strip = i % 5 == 0 ? (dng.height + 3) / 4 : draw.log_uniform(1, dng.height);
+    dng.part_gap = 2 * draw.below(3);
+    dng.parts_reversed = draw.coin();
+    ASSERT_EQ(test::samples_of(test::read_built(dng)), whole)
+        << dng.width << " x " << dng.height << " x " << dng.samples << ", " << dng.bits << " bits, rows "
+        << dng.rows_per_strip << ", seed " << seed + 1000 + i;
+    ASSERT_EQ(whole, test::ramp(dng));
+  }
+}
+
+TEST(StoredCodes, ALinearizationTableIsAppliedAsToOneStrip) {
+  std::vector<double> table(200);
+  for (std::size_t i = 0; i < table.size(); ++i) table[i] = static_cast<double>(i * i);
+  for (const int samples : {1, 3}) {
+    const auto codes = Draw(7).codes(40 * samples, 30, 8);
+    const auto with_table = [&](const CodeStore& how) {
+      DngBuilder dng = code_dng(codes, how);
+      dng.set(50712, Tag::numbers(TagType::u16, table));
+      dng.set(50717, Tag::numbers(TagType::u32, std::vector<double>(samples, 39601)));
+      return test::samples_of(test::read_built(dng));
+    };
+    const auto strip = with_table({.bits = 8, .samples = samples});
+    EXPECT_EQ(strip[5], table[std::min<std::size_t>(codes.data()[5], 199)]);
+    EXPECT_EQ(with_table({.bits = 8, .samples = samples, .tile_width = 16, .rows = 16}), strip);
+    EXPECT_EQ(with_table({.bits = 8, .samples = samples, .deflate = true, .predictor = 2}), strip);
+  }
+}
+
+TEST(StoredCodes, ABigTiffHasNoMoreTagsThanAClassicOne) {
+  constexpr std::size_t tags = 65536;
+  std::vector<std::byte> file(16 + 8 + 20 * tags + 8);
+  const auto put = [&](std::size_t at, const std::vector<int>& bytes) {
+    for (const int byte : bytes) file[at++] = static_cast<std::byte>(byte);
+  };
+  put(0, {'I', 'I', 43, 0, 8, 0, 0, 0, 16});
+  put(16, {0, 0, 1});
+  EXPECT_TRUE(has(test::refused(file), "has 65536 tags"));
+}
+
+TEST(StoredCodes, StripsWithBytesAfterTheirRowsAreNotShifted) {
+  const auto codes = Draw(8).codes(30, 24, 12);
+  DngBuilder dng = code_dng(codes, {.bits = 12, .rows = 7});
+  for (auto& part : dng.stored_parts) part.resize(part.size() + 3);
+  EXPECT_EQ(test::samples_of(test::read_built(dng)), all_of(codes));
+}
+
+TEST(StoredCodes, BigTiffIsReadWithItsTags) {
+  const auto codes = Draw(9).codes(40, 30, 14);
+  for (const bool big_endian : {false, true}) {
+    DngBuilder dng = code_dng(codes, {.bits = 14, .rows = 11, .big_endian = big_endian});
+    dng.set(33434, Tag::rationals(TagType::rational, {{1, 30}}));
+    dng.set(42036, Tag::text("A lens of 50 mm"));
+    dng.set(33432, Tag::text("Nobody"));
+    dng.set(50714, Tag::rationals(TagType::rational, {{129, 2}}));
+    const RawFrame classic = test::read_built(dng);
+    dng.big_tiff = true;
+    dng.raw_in_sub_ifd = true;
+    const RawFrame frame = test::read_built(dng);
+    EXPECT_EQ(test::samples_of(frame), all_of(codes));
+    EXPECT_EQ(frame.raw.info.exposure_s, 1.0 / 30);
+    EXPECT_EQ(frame.raw.black_tag->pattern_dn, std::vector<double>{64.5});
+    EXPECT_EQ(frame.colour.calibrations.size(), 1u);
+    ASSERT_TRUE(frame.source_tags && classic.source_tags);
+    EXPECT_EQ(text_of(frame.source_tags->exif, 42036), "A lens of 50 mm");
+    EXPECT_EQ(text_of(frame.source_tags->main, 33432), "Nobody");
+    EXPECT_EQ(bytes_of(*frame.source_tags), bytes_of(*classic.source_tags));
+  }
+  Plane<std::uint32_t> ones(30, 20);
+  std::fill_n(ones.data(), ones.size(), 0x3F800000U);
+  DngBuilder floats = test::float_dng(ones, {.deflate = true, .predictor = 3});
+  floats.big_tiff = true;
+  EXPECT_EQ(test::read_built(floats).raw.dn_float.at(29, 19), 1.0F);
+}
+
+TEST(StoredCodes, WhatIsNotSupportedIsNamed) {
+  DngBuilder jpeg;
+  jpeg.big_tiff = true;
+  jpeg.storage = DngStorage::lossless_jpeg;
+  EXPECT_TRUE(has(test::refused(jpeg), "lossless JPEG in a BigTIFF is not supported"));
+  const auto codes = Draw(10).codes(32, 30, 12);
+  const auto predicted = [&](int bits, double predictor) {
+    DngBuilder dng = code_dng(codes, {.bits = bits, .deflate = true});
+    return test::refused(dng.set(317, Tag::numbers(TagType::u16, {predictor})));
+  };
+  EXPECT_TRUE(has(predicted(16, 3), "predictor 3 of integers is not supported"));
+  EXPECT_TRUE(has(predicted(12, 2), "integers of 12 bits are not supported"));
+  for (const auto& [compression, samples] : {std::pair{7, 3}, {34892, 3}, {52546, 3}}) {
+    DngBuilder dng = code_dng(Draw(11).codes(90, 30, 8), {.bits = 8, .samples = samples, .planar = true});
+    dng.set(259, Tag::numbers(TagType::u16, {static_cast<double>(compression)}));
+    EXPECT_TRUE(has(test::refused(dng), "colour after colour are supported without compression or with Deflate only"));
+  }
+}
+
+TEST(StoredCodes, DamagedStorageIsOneClearLine) {
+  const auto codes = Draw(12).codes(40, 40, 16);
+  const CodeStore tiles{.tile_width = 16, .rows = 16}, deflated{.deflate = true, .predictor = 2, .rows = 9};
+  const auto numbers = [](const std::vector<double>& values) { return Tag::numbers(TagType::u32, values); };
+  DngBuilder fewer = code_dng(codes, tiles);
+  fewer.stored_parts.pop_back();
+  EXPECT_TRUE(has(test::refused(fewer), "needs 9 strips or tiles, the file has 8"));
+  DngBuilder brief = code_dng(codes, tiles);
+  brief.stored_parts[4].resize(511);
+  EXPECT_TRUE(has(test::refused(brief), "511 bytes, too few for 512"));
+  DngBuilder beyond = code_dng(codes, tiles);
+  EXPECT_TRUE(has(test::refused(beyond.set(324, numbers(std::vector<double>(9, 1e6)))), "reaches to byte"));
+  for (const std::uint16_t id : {322, 323}) {
+    for (const double side : {0.0, 1e9}) {
+      DngBuilder dng = code_dng(codes, tiles);
+      EXPECT_EQ(test::refused(dng.set(id, numbers({side}))).code, ErrorCode::malformed);
+    }
+  }
+  DngBuilder no_rows = code_dng(codes, deflated);
+  EXPECT_TRUE(has(test::refused(no_rows.set(278, numbers({0}))), "have no pixels"));
+  DngBuilder overlap = code_dng(codes, tiles);
+  overlap.set(324, numbers({100, 200, 300, 400, 500, 600, 700, 800, 900}));
+  EXPECT_TRUE(has(test::refused(overlap), "overlap"));
+  DngBuilder planes = code_dng(Draw(13).codes(90, 30, 16), {.samples = 3, .planar = true});
+  planes.stored_parts.pop_back();
+  EXPECT_TRUE(has(test::refused(planes), "needs 3 strips or tiles, the file has 2"));
+  DngBuilder cut = code_dng(codes, deflated);
+  cut.stored_parts[1].resize(cut.stored_parts[1].size() / 2);
+  EXPECT_TRUE(has(test::refused(cut), "from column 0, row 9 on do not decode"));
+  DngBuilder flipped = code_dng(codes, deflated);
+  flipped.stored_parts[4][flipped.stored_parts[4].size() / 2] ^= std::byte{1};
+  EXPECT_TRUE(has(test::refused(flipped), "row 36 on do not decode"));
+  DngBuilder strips;
+  strips.storage = DngStorage::lossless_jpeg;
+  strips.rows_per_strip = 8;
+  EXPECT_TRUE(has(test::refused(strips.remove(278)), "RowsPerStrip states one"));
+}
+
+/// Returns the file with the count of values of a tag of its first directory replaced.
+std::vector<std::byte> with_count(const DngBuilder& dng, std::uint16_t id, std::uint64_t count) {
+  std::vector<std::byte> file = dng.build();
+  const std::size_t step = dng.big_tiff ? 20 : 12;
+  for (std::size_t at = dng.big_tiff ? 24 : 10; at + step < file.size(); at += step) {
+    if (std::to_integer<int>(file[at]) + 256 * std::to_integer<int>(file[at + 1]) != id) continue;
+    for (std::size_t i = 0; i < (dng.big_tiff ? 8 : 4); ++i)
+      file[at + 4 + i] = static_cast<std::byte>(count >> 8 * i & 255);
+    return file;
+  }
+  ADD_FAILURE() << "no tag " << id;
+  return file;
+}
+
+TEST(StoredCodes, CountsAndSizesBeyondTheFileTakeNoMemory) {
+  const std::int64_t idle = test::peak_bytes([] {});
+  const auto refused_in_little = [&](const std::vector<std::byte>& file) {
+    const std::int64_t peak = test::peak_bytes([&] { EXPECT_FALSE(test::refused(file).message.empty()); });
+    EXPECT_LT(peak, idle + (std::int64_t{24} << 20));
+  };
+  const auto codes = Draw(14).codes(40, 40, 16);
+  for (const bool big_tiff : {false, true}) {
+    DngBuilder dng = code_dng(codes, {.tile_width = 16, .rows = 16});
+    dng.big_tiff = big_tiff;
+    for (const std::uint16_t id : {324, 325}) {
+      refused_in_little(with_count(dng, id, 1'000'000'000));
+      refused_in_little(with_count(dng, id, 4'000'000));
+      if (big_tiff) refused_in_little(with_count(dng, id, 0x2000000000000001U));
+    }
+    for (const bool deflate : {false, true}) {
+      DngBuilder vast = code_dng(codes, {.deflate = deflate});
+      vast.big_tiff = big_tiff;
+      for (const std::uint16_t id : {256, 257, 278}) vast.set(id, Tag::numbers(TagType::u32, {19000}));
+      refused_in_little(vast.build());
+    }
+  }
+}
+
+TEST(StoredCodes, EveryTruncationIsAnError) {
+  for (const bool big_tiff : {false, true}) {
+    DngBuilder dng = code_dng(Draw(15).codes(30, 24, 12), {.bits = 12, .tile_width = 16, .rows = 16});
+    dng.big_tiff = big_tiff;
+    const auto bytes = dng.build();
+    for (std::size_t size = 0; size < bytes.size(); size += 3) {
+      EXPECT_FALSE(test::read_bytes({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)})) << size;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lowlux::capture
