@@ -15,12 +15,12 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr std::uint32_t max_size = 65535;  // LibRaw keeps sizes in 16 bits
+constexpr std::uint32_t max_size = 65535;
 
-tl::unexpected<Error> wrong_size(std::int64_t width, std::int64_t height, int least) {
+tl::unexpected<Error> wrong_size(std::int64_t width, std::int64_t height, int min_side, std::int64_t max_side) {
   return fail(ErrorCode::malformed, "a raw image of " + std::to_string(width) + " x " + std::to_string(height) +
-                                        " pixels cannot be decoded, " + std::to_string(least) +
-                                        " to 65535 each way can");
+                                        " pixels cannot be decoded, " + std::to_string(min_side) + " to " +
+                                        std::to_string(max_side) + " each way can");
 }
 
 /// Returns whether the samples are floating-point numbers.
@@ -122,6 +122,22 @@ Result<void> fill_mosaic(const TiffDirectory& directory, DngImage& image) {
   return {};
 }
 
+/// Checks that there are as many tiles as the image needs. LibRaw leaves the rest of the image black.
+Result<void> check_tile_count(const TiffDirectory& directory, const DngImage& image, const DngParts& parts) {
+  if (!parts.tiled) return {};
+  auto width = directory.whole_or(tag::tile_width, static_cast<std::uint32_t>(image.width));  // as LibRaw takes it
+  if (!width) return pass_on(width);
+  auto height = directory.whole_or(tag::tile_length, static_cast<std::uint32_t>(image.height));
+  if (!height) return pass_on(height);
+  if (*width < 1 || *height < 1) return fail(ErrorCode::malformed, "the strips or tiles have no pixels");
+  const auto count = [](int pixels, double side) { return std::ceil(pixels / side); };
+  const double needed = count(image.width, *width) * count(image.height, *height);
+  if (static_cast<double>(parts.offset.size()) >= needed) return {};
+  return fail(ErrorCode::malformed, "the image of " + std::to_string(image.width) + " x " +
+                                        std::to_string(image.height) + " pixels needs " + number_text(needed) +
+                                        " strips or tiles, the file has " + std::to_string(parts.offset.size()));
+}
+
 /// Checks that lossless JPEG is stored as LibRaw reads it: in a classic TIFF, in tiles or strips that it can take for
 /// tiles (as_tiles_of_libraw), of an image that it does not take for a thumbnail.
 Result<void> check_lossless_jpeg(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
@@ -130,9 +146,12 @@ Result<void> check_lossless_jpeg(const TiffDirectory& directory, const DngImage&
                 "lossless JPEG in a BigTIFF is not supported: convert it to a DNG below 4 GB, or without compression",
                 tag::compression.name);
   }
-  if (std::min(image.width, image.height) < min_libraw_side)
-    return wrong_size(image.width, image.height, min_libraw_side);
-  if (!is_jpeg_in_strips(directory)) return dng_parts(directory, file_bytes).map([](const DngParts& /*parts*/) {});
+  if (!is_libraw_size(image)) return wrong_size(image.width, image.height, min_libraw_side, max_libraw_side);
+  if (!is_jpeg_in_strips(directory)) {
+    return dng_parts(directory, file_bytes).and_then([&](const DngParts& parts) {
+      return check_tile_count(directory, image, parts);
+    });
+  }
   auto grid = dng_grid(directory, image, file_bytes);
   if (!grid) return pass_on(grid);
   if (grid->count == 1) {
@@ -246,7 +265,8 @@ Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_byte
   if (!samples) return pass_on(samples);
   auto is_float = holds_floats(directory);
   if (!is_float) return pass_on(is_float);
-  if (std::min(*width, *height) < 1 || std::max(*width, *height) > max_size) return wrong_size(*width, *height, 1);
+  if (std::min(*width, *height) < 1 || std::max(*width, *height) > max_size)
+    return wrong_size(*width, *height, 1, max_size);
   DngImage image;
   image.is_float = *is_float;
   image.width = static_cast<int>(*width);

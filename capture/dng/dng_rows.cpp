@@ -153,7 +153,7 @@ Result<void> check_row_image(const TiffDirectory& directory, const DngImage& ima
 }
 
 bool is_for_libraw(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
-  if (directory.is_big_tiff || image.is_planar || std::min(image.width, image.height) < min_libraw_side) return false;
+  if (directory.is_big_tiff || image.is_planar || !is_libraw_size(image)) return false;
   const auto strips = dng_parts(directory, file_bytes);
   if (!strips || strips->tiled || !are_adjacent(*strips)) return false;
   const std::size_t row_samples = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.samples);

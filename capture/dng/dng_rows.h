@@ -19,7 +19,7 @@ namespace lowlux::capture {
 Result<void> check_row_image(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes);
 
 /// Returns whether LibRaw 0.20 reads this uncompressed image of integers: row after row without a gap, in a classic
-/// TIFF, 22 pixels wide and high or more, and not in tiles.
+/// TIFF, 22 to 64,000 pixels wide and high, and not in tiles.
 bool is_for_libraw(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes);
 
 /// Both decode an image that check_row_image accepts, to height x (width * samples).

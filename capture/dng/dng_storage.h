@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -15,7 +16,8 @@
 
 namespace lowlux::capture {
 
-inline constexpr int min_libraw_side = 22;  // LibRaw treats smaller images as thumbnails
+inline constexpr int min_libraw_side = 22;     // LibRaw treats smaller images as thumbnails
+inline constexpr int max_libraw_side = 64000;  // and larger ones as damaged
 
 /// What decodes the samples of a raw image.
 enum class DngDecoder : std::uint8_t {
@@ -39,6 +41,12 @@ struct DngImage {
   std::optional<QuadBayer> quad_bayer;  // of a mosaic that is Quad Bayer
   std::optional<XTransPhase> x_trans;   // of a mosaic that is X-Trans and not Bayer, from the corner of the active area
 };
+
+/// Returns whether LibRaw reads an image of this size.
+inline bool is_libraw_size(const DngImage& image) {
+  return std::min(image.width, image.height) >= min_libraw_side &&
+         std::max(image.width, image.height) <= max_libraw_side;
+}
 
 /// Locations of the parts (strips or tiles) of an image, all inside the file.
 struct DngParts {

@@ -139,6 +139,17 @@ Result<DecodedRaw> decode_dng(const DngFile& dng, const TiffDirectory& raw_image
   return decode_contained(changed, limits);
 }
 
+/// Returns the error of a file with far too few bytes for its samples, which decoders leave black. Lossless JPEG needs
+/// at least an eighth of a byte for each sample.
+Result<void> check_bytes(std::size_t bytes, const DecodedRaw& decoded) {
+  constexpr std::size_t max_samples_per_byte = 128;
+  if (decoded.samples.size() / max_samples_per_byte <= bytes) return {};
+  return fail(ErrorCode::malformed, "the file has " + std::to_string(bytes) + " bytes, too few for " +
+                                        std::to_string(decoded.header.raw_width) + " x " +
+                                        std::to_string(decoded.header.raw_height) +
+                                        " pixels: it is truncated or holds no image");
+}
+
 Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits,
                           const XTransUse& use) {
   auto described = describe_dng(dng, dng.raw_images.front(), bytes.size());
@@ -194,6 +205,7 @@ Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& 
   }
   auto decoded = decode_contained(bytes, limits);
   if (!decoded) return tl::make_unexpected(not_decoded(bytes, std::move(decoded.error())));
+  if (auto enough = check_bytes(bytes.size(), *decoded); !enough) return pass_on(enough);
   auto frame = frame_of_decoder(*std::move(decoded), use);
   if (!frame) return frame;
   ignore_impossible_white(frame->colour, frame->warnings);

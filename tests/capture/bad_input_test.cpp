@@ -170,7 +170,7 @@ TEST(BadInput, AbsurdDimensionsAreRefusedWithoutTakingTheirMemory) {
   EXPECT_TRUE(has(refused(sized(2147483648.0, 24)), "2147483648 x 24 pixels cannot be decoded"));
   EXPECT_TRUE(has(refused(sized(4294967295.0, 4294967295.0)), "cannot be decoded"));
   EXPECT_TRUE(has(refused(sized(0, 24)), "0 x 24"));
-  DngBuilder compressed = sized(65535, 65535);
+  DngBuilder compressed = sized(64000, 64000);
   compressed.storage = DngStorage::lossless_jpeg;
   EXPECT_EQ(refused(compressed).code, ErrorCode::too_large);
   getrusage(RUSAGE_SELF, &after);
@@ -183,7 +183,15 @@ TEST(BadInput, SmallImagesThatTheDecoderDoesNotTakeAreRefusedBySize) {
   EXPECT_EQ(samples_of(read_built(dng)), ramp(dng));  // uncompressed ones are read without it
   dng.storage = DngStorage::lossless_jpeg;
   dng.jpeg_components = 1;
-  EXPECT_TRUE(has(refused(dng), "21 x 24 pixels cannot be decoded, 22 to 65535"));
+  EXPECT_TRUE(has(refused(dng), "21 x 24 pixels cannot be decoded, 22 to 64000"));
+}
+
+TEST(BadInput, FewerTilesOfLosslessJpegThanTheImageNeedsAreRefused) {
+  DngBuilder dng;
+  dng.storage = DngStorage::tiled_lossless_jpeg;
+  const auto offsets = Tag::numbers(TagType::u32, {1000, 1100, 1200});
+  dng.set(324, offsets).set(325, Tag::numbers(TagType::u32, {22, 22, 22}));
+  EXPECT_TRUE(has(refused(dng), "24 x 24 pixels needs 4 strips or tiles, the file has 3"));
 }
 
 TEST(BadInput, LimitsOfTheCallerHold) {
