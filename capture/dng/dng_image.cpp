@@ -9,6 +9,7 @@
 #include "capture/dng/dng_lossy.h"
 #include "capture/dng/dng_rows.h"
 #include "capture/dng/dng_tags.h"
+#include "capture/dng/jpeg_strips.h"
 #include "capture/file/pass_on.h"
 #include "isp/base/text.h"
 
@@ -139,7 +140,7 @@ Result<void> check_tile_count(const TiffDirectory& directory, const DngImage& im
 }
 
 /// Checks that lossless JPEG is stored as LibRaw reads it: in a classic TIFF, in tiles or strips that it can take for
-/// tiles (as_tiles_of_libraw), of an image that it does not take for a thumbnail.
+/// tiles (jpeg_strips.h), of an image that it does not take for a thumbnail.
 Result<void> check_lossless_jpeg(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
   if (directory.is_big_tiff) {
     return fail(ErrorCode::unsupported,
@@ -147,20 +148,10 @@ Result<void> check_lossless_jpeg(const TiffDirectory& directory, const DngImage&
                 tag::compression.name);
   }
   if (!is_libraw_size(image)) return wrong_size(image.width, image.height, min_libraw_side, max_libraw_side);
-  if (!is_jpeg_in_strips(directory)) {
-    return dng_parts(directory, file_bytes).and_then([&](const DngParts& parts) {
-      return check_tile_count(directory, image, parts);
-    });
-  }
-  auto grid = dng_grid(directory, image, file_bytes);
-  if (!grid) return pass_on(grid);
-  if (grid->count == 1) {
-    return fail(ErrorCode::malformed, "the image has more than one strip of lossless JPEG, but RowsPerStrip states one",
-                tag::rows_per_strip.name);
-  }
-  if (directory.find(tag::strip_offsets)->type == TiffEntry::Type::u32) return {};
-  return fail(ErrorCode::unsupported, "lossless JPEG in strips is supported with offsets of 32 bits only",
-              tag::strip_offsets.name);
+  if (is_jpeg_in_strips(directory)) return check_jpeg_strips(directory, image, file_bytes);
+  return dng_parts(directory, file_bytes).and_then([&](const DngParts& parts) {
+    return check_tile_count(directory, image, parts);
+  });
 }
 
 Result<DngDecoder> decoder_of(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
@@ -225,7 +216,7 @@ Result<void> fill_layout(const TiffDirectory& directory, DngImage& image) {
   }
   auto planar = directory.whole_or(tag::planar_configuration, 1);
   if (!planar) return pass_on(planar);
-  if (*planar != 1 && *planar != 2) {
+  if (image.samples == 3 && *planar != 1 && *planar != 2) {
     return fail(ErrorCode::malformed, "the tag PlanarConfiguration is damaged", tag::planar_configuration.name);
   }
   image.is_planar = image.samples == 3 && *planar == 2;

@@ -106,13 +106,6 @@ Result<DngGrid> dng_grid(const TiffDirectory& directory, const DngImage& image, 
   return fail(ErrorCode::malformed, "the strips or tiles of the image overlap: the file is damaged");
 }
 
-bool is_jpeg_in_strips(const TiffDirectory& directory) {
-  const auto compression = directory.whole_or(tag::compression, tag::compression_none);
-  const TiffEntry* const strips = directory.find(tag::strip_offsets);
-  return compression && *compression == tag::compression_jpeg && directory.find(tag::tile_offsets) == nullptr &&
-         strips != nullptr && strips->count > 1;
-}
-
 bool is_deflate(std::uint32_t compression) {
   return compression == tag::compression_deflate || compression == tag::compression_old_deflate;
 }

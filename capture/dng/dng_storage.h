@@ -83,9 +83,6 @@ Result<DngGrid> dng_grid(const TiffDirectory& directory, const DngImage& image, 
 /// Returns the value of a tag that must be there and be an integer.
 Result<std::uint32_t> required_whole(const TiffDirectory& directory, TagName name);
 
-/// Returns whether an image is in lossless JPEG, in more than one strip.
-bool is_jpeg_in_strips(const TiffDirectory& directory);
-
 /// Returns whether a compression is Deflate, by one of its two numbers.
 bool is_deflate(std::uint32_t compression);
 

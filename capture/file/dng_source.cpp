@@ -17,6 +17,7 @@
 #include "capture/dng/dng_lossy.h"
 #include "capture/dng/dng_rows.h"
 #include "capture/dng/dng_tags.h"
+#include "capture/dng/jpeg_strips.h"
 #include "capture/dng/source_tags.h"
 #include "capture/dng/tiff_directory.h"
 #include "capture/file/decoder_frame.h"
@@ -115,27 +116,17 @@ std::vector<const TiffEntry*> harmful_tags(const DngFile& dng) {
   return found;
 }
 
-void set_tag(const TiffEntry& entry, std::uint16_t id, std::vector<std::byte>& file) {
-  file[entry.place + (entry.big_endian ? 0 : 1)] = static_cast<std::byte>(id >> 8);
-  file[entry.place + (entry.big_endian ? 1 : 0)] = static_cast<std::byte>(id & 255);
-}
-
-/// Presents strips to LibRaw as tiles: of strips it decodes lossless JPEG in the first one only. It takes tiles without
-/// TileWidth to be as wide as the image.
-void as_tiles_of_libraw(const TiffDirectory& strips, std::vector<std::byte>& file) {
-  set_tag(*strips.find(tag::strip_offsets), tag::tile_offsets.id, file);
-  set_tag(*strips.find(tag::strip_byte_counts), tag::tile_byte_counts.id, file);
-  set_tag(*strips.find(tag::rows_per_strip), tag::tile_length.id, file);
-}
-
-Result<DecodedRaw> decode_dng(const DngFile& dng, const TiffDirectory& raw_image, std::span<const std::byte> bytes,
+Result<DecodedRaw> decode_dng(const DngFile& dng, const DngDescription& described, std::span<const std::byte> bytes,
                               const ReadLimits& limits) {
   const auto harmful = harmful_tags(dng);
-  const bool in_strips = is_jpeg_in_strips(raw_image);
+  const bool in_strips = is_jpeg_in_strips(*described.directory);
   if (harmful.empty() && !in_strips) return decode_contained(bytes, limits);
   std::vector<std::byte> changed(bytes.begin(), bytes.end());
   for (const TiffEntry* entry : harmful) set_tag(*entry, 0, changed);
-  if (in_strips) as_tiles_of_libraw(raw_image, changed);
+  if (in_strips) {
+    auto presented = present_strips_as_tiles(*described.directory, described.image, changed);
+    if (!presented) return pass_on(presented);
+  }
   return decode_contained(changed, limits);
 }
 
@@ -185,7 +176,7 @@ Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, 
     case DngDecoder::libraw:
       break;
   }
-  auto decoded = decode_dng(dng, raw_image, bytes, limits);
+  auto decoded = decode_dng(dng, *described, bytes, limits);
   if (!decoded) return pass_on(decoded);
   return complete_dng(dng, *std::move(described), bytes.size(), *std::move(decoded), use);
 }

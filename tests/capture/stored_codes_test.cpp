@@ -242,6 +242,11 @@ TEST(StoredCodes, DamagedStorageIsOneClearLine) {
   strips.storage = DngStorage::lossless_jpeg;
   strips.rows_per_strip = 8;
   EXPECT_TRUE(has(test::refused(strips.remove(278)), "RowsPerStrip states one"));
+  DngBuilder low;
+  low.storage = DngStorage::lossless_jpeg;
+  low.rows_per_strip = 8;
+  low.set(278, Tag::numbers(TagType::u32, {12}));  // two strips of 12 rows, of which 8 are there
+  EXPECT_TRUE(has(test::refused(low), "from row 0 on has too few samples for its 12 rows"));
 }
 
 /// Returns the file with the count of values of a tag of its first directory replaced.
