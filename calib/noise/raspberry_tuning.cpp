@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <utility>
 
@@ -198,6 +199,7 @@ std::optional<CameraProfile> raspberry_profile(std::string_view sensor) {
 
 std::vector<std::string> raspberry_sensors() {
   std::vector<std::string> names;
+  names.reserve(std::size(known_sensors));
   for (const KnownSensor& sensor : known_sensors) names.emplace_back(sensor.name);
   return names;
 }
