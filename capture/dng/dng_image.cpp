@@ -132,11 +132,7 @@ Result<void> check_tile_count(const TiffDirectory& directory, const DngImage& im
   if (!height) return pass_on(height);
   if (*width < 1 || *height < 1) return fail(ErrorCode::malformed, "the strips or tiles have no pixels");
   const auto count = [](int pixels, double side) { return std::ceil(pixels / side); };
-  const double needed = count(image.width, *width) * count(image.height, *height);
-  if (static_cast<double>(parts.offset.size()) >= needed) return {};
-  return fail(ErrorCode::malformed, "the image of " + std::to_string(image.width) + " x " +
-                                        std::to_string(image.height) + " pixels needs " + number_text(needed) +
-                                        " strips or tiles, the file has " + std::to_string(parts.offset.size()));
+  return check_part_count(image, count(image.width, *width) * count(image.height, *height), parts);
 }
 
 /// Checks that lossless JPEG is stored as LibRaw reads it: in a classic TIFF, in tiles or strips that it can take for

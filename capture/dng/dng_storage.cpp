@@ -86,6 +86,13 @@ Result<DngParts> dng_parts(const TiffDirectory& directory, std::size_t file_byte
   return parts;
 }
 
+Result<void> check_part_count(const DngImage& image, double needed, const DngParts& parts) {
+  if (static_cast<double>(parts.offset.size()) >= needed) return {};
+  return fail(ErrorCode::malformed, "the image of " + std::to_string(image.width) + " x " +
+                                        std::to_string(image.height) + " pixels needs " + number_text(needed) +
+                                        " strips or tiles, the file has " + std::to_string(parts.offset.size()));
+}
+
 Result<DngGrid> dng_grid(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
   auto at = dng_parts(directory, file_bytes);
   if (!at) return pass_on(at);
@@ -97,11 +104,7 @@ Result<DngGrid> dng_grid(const TiffDirectory& directory, const DngImage& image, 
   const int down = (image.height + grid.height - 1) / grid.height;
   grid.covering = static_cast<std::size_t>(down) * static_cast<std::size_t>(grid.across);
   grid.count = grid.covering * static_cast<std::size_t>(image.is_planar ? image.samples : 1);
-  if (grid.at.offset.size() < grid.count) {
-    return fail(ErrorCode::malformed, "the image of " + std::to_string(image.width) + " x " +
-                                          std::to_string(image.height) + " pixels needs " + std::to_string(grid.count) +
-                                          " strips or tiles, the file has " + std::to_string(grid.at.offset.size()));
-  }
+  if (auto enough = check_part_count(image, static_cast<double>(grid.count), grid.at); !enough) return pass_on(enough);
   if (!do_overlap(grid.at, grid.count)) return grid;
   return fail(ErrorCode::malformed, "the strips or tiles of the image overlap: the file is damaged");
 }

@@ -61,6 +61,9 @@ struct DngParts {
 
 Result<DngParts> dng_parts(const TiffDirectory& directory, std::size_t file_bytes);
 
+/// Returns the error of an image that has fewer parts than it needs.
+Result<void> check_part_count(const DngImage& image, double needed, const DngParts& parts);
+
 /// Parts of equal size that cover an image row after row; the last ones may extend beyond it. An image that is stored
 /// colour after colour is covered once for each colour.
 struct DngGrid {

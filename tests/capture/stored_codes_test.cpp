@@ -165,7 +165,7 @@ TEST(StoredCodes, BigTiffIsReadWithItsTags) {
     DngBuilder dng = code_dng(codes, {.bits = 14, .rows = 11, .big_endian = big_endian});
     dng.set(33434, Tag::rationals(TagType::rational, {{1, 30}}));
     dng.set(42036, Tag::text("A lens of 50 mm"));
-    dng.set(33432, Tag::text("Nobody"));
+    dng.set(33432, Tag::text("Photographer"));
     dng.set(50714, Tag::rationals(TagType::rational, {{129, 2}}));
     const RawFrame classic = test::read_built(dng);
     dng.big_tiff = true;
@@ -177,7 +177,7 @@ TEST(StoredCodes, BigTiffIsReadWithItsTags) {
     EXPECT_EQ(frame.colour.calibrations.size(), 1u);
     ASSERT_TRUE(frame.source_tags && classic.source_tags);
     EXPECT_EQ(text_of(frame.source_tags->exif, 42036), "A lens of 50 mm");
-    EXPECT_EQ(text_of(frame.source_tags->main, 33432), "Nobody");
+    EXPECT_EQ(text_of(frame.source_tags->main, 33432), "Photographer");
     EXPECT_EQ(bytes_of(*frame.source_tags), bytes_of(*classic.source_tags));
   }
   Plane<std::uint32_t> ones(30, 20);
