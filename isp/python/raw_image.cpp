@@ -127,11 +127,12 @@ RawImagePtr read_raw(const std::string& path) {
   return out;
 }
 
-void write_dng(const RawImage& image, const std::string& path, bool overwrite) {
+void write_dng(const RawImage& image, const std::string& path, bool overwrite, bool compressed) {
   const py::gil_scoped_release released;
   value_of(isp::write_dng(image.frame, path,
                           {.overwrite = overwrite ? isp::Overwrite::yes : isp::Overwrite::no,
-                           .software = "lowlux " + cli::version_number()}));
+                           .software = "lowlux " + cli::version_number(),
+                           .compression = compressed ? isp::DngCompression::lossless : isp::DngCompression::none}));
 }
 
 RawImagePtr from_array(const py::array& mosaic, std::vector<double> black_dn_, std::vector<double> white_dn_,

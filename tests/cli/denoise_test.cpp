@@ -13,6 +13,7 @@
 #include "isp/base/executor.h"
 #include "tests/cli/command.h"
 #include "tests/cli/simulate/simulate_command.h"
+#include "tests/codec/pictures.h"
 
 namespace lowlux {
 namespace {
@@ -51,6 +52,18 @@ class DenoiseCommand : public test::SimulateCommand {
     return std::move(picture->xyz);
   }
 };
+
+TEST_F(DenoiseCommand, CompressedFilesAreSmallerAndHoldTheSameSamples) {
+  ASSERT_EQ(denoised().exit_code, 0);
+  const auto plain = capture::read_raw(file("clean.dng"));
+  const auto plain_bytes = std::filesystem::file_size(file("clean.dng"));
+  ASSERT_EQ(denoised({"--force", "--compression", "lossless"}).exit_code, 0);
+  const auto compressed = capture::read_raw(file("clean.dng"));
+  ASSERT_TRUE(plain && compressed);
+  EXPECT_TRUE(test::same_bits(compressed->raw.dn, plain->raw.dn));
+  EXPECT_LT(std::filesystem::file_size(file("clean.dng")), plain_bytes * 3 / 4);
+  EXPECT_EQ(denoised({"--force", "--compression", "best"}).exit_code, 2);
+}
 
 TEST_F(DenoiseCommand, GivesACleanRawThatSaysHowNoisyItIs) {
   const auto result = denoised({"--json"});

@@ -57,6 +57,20 @@ def test_floats_below_black_and_above_white_keep_their_bits(kind, tmp_path, rng)
     assert raw.raw_image.tobytes() == mosaic.astype(np.float32).tobytes()
 
 
+@pytest.mark.parametrize("cfa", ["RGGB", "MONO", None])
+def test_compressed_files_hold_the_same_samples_in_fewer_bytes(cfa, tmp_path, rng):
+    mosaic = rng.integers(500, 520, (600, 530), dtype=np.uint16)
+    figures = dict(cfa=cfa) if cfa else dict(black=0, white=1)
+    if not cfa:
+        mosaic = np.stack([mosaic / 520] * 3, axis=2).astype(np.float32)
+    raw = written(tmp_path / "a.dng", mosaic, compression="lossless", **figures)
+    np.testing.assert_array_equal(raw.raw_image, mosaic)
+    assert (tmp_path / "a.dng").stat().st_size < 0.5 * mosaic.nbytes
+    with pytest.raises(lowlux.ArgumentError, match="neither"):
+        written(tmp_path / "b.dng", mosaic, compression="zip", **figures)
+    assert not (tmp_path / "b.dng").exists()
+
+
 @pytest.mark.parametrize("cfa", PHASES)
 def test_the_pattern_is_the_one_that_was_written(cfa, tmp_path, rng):
     raw = written(tmp_path / "p.dng", codes(rng), cfa=cfa)

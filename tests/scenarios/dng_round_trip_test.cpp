@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <random>
 #include <utility>
 
 #include "capture/file/dng_source.h"
@@ -56,6 +57,35 @@ TEST(DngRoundTrip, EveryPhaseAndLayoutAtOddAndEvenSizesIsBitExact) {
       EXPECT_TRUE(test::same_bits(read.raw.dn, frame.raw.dn)) << width << " x " << height;
       EXPECT_EQ(read.colour.calibrations.size(), frame.colour.calibrations.size());
     }
+  }
+}
+
+/// The tiles of a lossless JPEG are decoded by LibRaw, deflated floats by lowlux.
+TEST(DngRoundTrip, CompressedSamplesOfDrawnSizesAreBitExact) {
+  const std::uint64_t seed = std::random_device{}();
+  std::mt19937_64 random(seed);
+  const auto side = [&] { return static_cast<int>(22 * std::exp2(std::uniform_real_distribution<>(0, 6.5)(random))); };
+  for (int i = 0; i < 40; ++i) {
+    const int width = i < 6 ? 1024 : side(), height = side();  // 1024: two tiles
+    const auto layout = static_cast<SensorLayout>(i % 3);
+    RawFrame frame = plain_frame(width, height, layout, static_cast<BayerPhase>(random() % 4));
+    const bool floats = i % 4 == 3;
+    if (floats) {
+      test::make_floats(frame.raw);
+    } else {
+      const double noise = std::exp2(std::uniform_real_distribution<>(0, 16)(random));
+      std::uniform_real_distribution<> values(0, noise);
+      for (std::size_t k = 0; k < frame.raw.samples(); ++k) {
+        frame.raw.dn.data()[k] = static_cast<std::uint16_t>(values(random));
+      }
+    }
+    const RawFrame read = round_trip(frame, {.compression = isp::DngCompression::lossless});
+    ASSERT_EQ(read.raw.layout, layout);
+    const bool same =
+        floats ? test::same_bits(read.raw.dn_float, frame.raw.dn_float) : test::same_bits(read.raw.dn, frame.raw.dn);
+    EXPECT_TRUE(same) << "seed " << seed << ", frame " << i << ": " << width << " x " << height;
+    EXPECT_TRUE(layout != SensorLayout::bayer || read.raw.phase == frame.raw.phase);
+    EXPECT_EQ(read.raw.white_dn, frame.raw.white_dn);
   }
 }
 

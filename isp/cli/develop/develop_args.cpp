@@ -36,6 +36,13 @@ void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
   app.add_flag("--quiet", args.quiet, "print no warnings and no progress");
 }
 
+void add_compression(CLI::App& app, DevelopArgs& args) {
+  add_choice<isp::DngCompression>(
+      app, "--compression", {{"none", isp::DngCompression::none}, {"lossless", isp::DngCompression::lossless}},
+      [&args](isp::DngCompression compression) { args.compression = compression; },
+      "compression of the DNG: none or lossless (default: none)");
+}
+
 void add_output(CLI::App& app, DevelopArgs& args) {
   app.add_option(
          "-o,--output", args.output,
@@ -155,6 +162,7 @@ Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
                  "raw file to write (.dng), - for standard output, or a folder (created if it ends with /)")
       ->required()
       ->type_name("CLEAN.dng");
+  add_compression(app, args);
   add_camera(app, args);
   add_denoise(app, args, NoiseLevels::at_least_draft);
   add_darks(app, args.dark);
@@ -170,6 +178,7 @@ Parsed<DevelopArgs> parse_merge(const std::vector<std::string>& words) {
   args.options.denoise.always = true;
   app.add_option("RAW", args.inputs, "raw files, or folders of them")->required();
   app.add_option("-o,--output", args.output, "raw file to write (.dng)")->required()->type_name("MERGED.dng");
+  add_compression(app, args);
   add_merging(app, args.merging);
   add_camera(app, args);
   add_line_noise(app, args);

@@ -13,6 +13,7 @@
 #include "isp/cli/develop/look_args.h"
 #include "isp/cli/info/advise_args.h"
 #include "isp/cli/merge/merge_args.h"
+#include "isp/output/dng/dng_writer.h"
 #include "isp/pipeline/options.h"
 
 namespace CLI {
@@ -58,7 +59,8 @@ struct DevelopArgs {
   Shard shard;   // of the files
   bool force = false;
   bool skip_existing = false;
-  bool sync = false;  // files are flushed to disk before the next one begins
+  isp::DngCompression compression = isp::DngCompression::none;  // of the raw files written
+  bool sync = false;                                            // files are flushed to disk before the next one begins
   bool json = false;
   bool timings = false;
   bool explain = false;

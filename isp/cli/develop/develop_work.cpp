@@ -187,7 +187,8 @@ Result<void> write_denoised(const RawBatch& batch, const Job& job, const Denoise
   const isp::DngWriteOptions options{.overwrite = job.overwrite,
                                      .software = "lowlux " + version_number(),
                                      .description = denoised.description,
-                                     .sync = batch.sync};
+                                     .sync = batch.sync,
+                                     .compression = batch.args.compression};
   const auto written = is_standard_stream(job.output) ? isp::write_dng(denoised.frame, STDOUT_FILENO, options)
                                                       : write_with_maps(batch, job, denoised.maps, [&] {
                                                           return isp::prepare_dng(denoised.frame, job.output, options);

@@ -82,8 +82,8 @@ struct Group {
 const std::vector<Group>& raw_groups() {
   static const std::vector<Group> groups{
       {"Files",
-       {"--output", "--format", "--as", "--raw", "--bits", "--quality", "--jobs", "--shard", "--skip-existing",
-        "--force", "--sync"}},
+       {"--output", "--format", "--as", "--raw", "--bits", "--quality", "--compression", "--jobs", "--shard",
+        "--skip-existing", "--force", "--sync"}},
       {"Camera",
        {"--size", "--fps", "--gain-code", "--flip", "--memory", "--buffers", "--timeout", "--exposure-time", "--gain",
         "--auto-exposure", "--max-exposure", "--max-gain", "--mains", "--clip", "--gain-codes"}},

@@ -107,7 +107,8 @@ Result<void> write_merged(const RawBatch& batch, const Job& output, MergeReport&
                                                .software = "lowlux " + version_number(),
                                                .description = description_of(merged),
                                                .sync = batch.sync,
-                                               .baseline_exposure_ev = merged.baseline_exposure_ev});
+                                               .baseline_exposure_ev = merged.baseline_exposure_ev,
+                                               .compression = batch.args.compression});
   if (!written) return fail(written.error().code, written.error().message, output.output);
   return {};
 }

@@ -8,8 +8,10 @@
 #include <cstddef>
 #include <new>
 #include <utility>
+#include <vector>
 
 #include "isp/base/text.h"
+#include "isp/codec/lossless_jpeg.h"
 #include "isp/codec/source_tags_output.h"
 #include "isp/codec/tiff_file.h"
 #include "isp/output/dng/dng_check.h"
@@ -24,6 +26,7 @@ constexpr std::size_t longest_description = 4000;
 constexpr double max_baseline_exposure_ev = 100;
 constexpr std::uint16_t opcode_list3 = 51022;
 constexpr int photometric_linear_raw = 34892;  // DNG LinearRaw
+constexpr int max_tile_side = 512;             // px
 
 std::string unique_camera_model(const FrameInfo& info) {
   if (info.model.empty()) return info.make.empty() ? "Unknown" : info.make;
@@ -31,7 +34,33 @@ std::string unique_camera_model(const FrameInfo& info) {
   return info.make + " " + info.model;
 }
 
-void set_image(TIFF* tiff, const RawDn& raw, int rows_per_strip) {
+/// Returns the number of rows in strips of about 1 MB.
+int rows_per_strip(const RawDn& raw) {
+  const std::size_t row_bytes = raw.sample_bytes() * raw.row_samples();
+  return static_cast<int>(std::clamp<std::size_t>(tiff_strip_bytes / row_bytes, 1, raw.rows()));
+}
+
+/// Returns the width of tiles, a multiple of 16. LibRaw misreads tiles that are wider than the image, and takes two
+/// tiles of two components each that are as wide as the image for one.
+int tile_width(const RawDn& raw) {
+  const int width = raw.row_samples() / samples_of(raw.layout);
+  const int tile = std::clamp(width / 16 * 16, 16, max_tile_side);
+  return raw.layout == SensorLayout::bayer && 2 * tile == width ? tile - 16 : tile;
+}
+
+void set_storage(TIFF* tiff, const RawDn& raw, DngCompression compression) {
+  if (compression == DngCompression::none) {
+    TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_NONE);
+    TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, rows_per_strip(raw));
+    return;
+  }
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, raw.is_float() ? COMPRESSION_ADOBE_DEFLATE : COMPRESSION_JPEG);
+  if (raw.is_float()) TIFFSetField(tiff, TIFFTAG_PREDICTOR, PREDICTOR_FLOATINGPOINT);
+  TIFFSetField(tiff, TIFFTAG_TILEWIDTH, tile_width(raw));
+  TIFFSetField(tiff, TIFFTAG_TILELENGTH, max_tile_side);
+}
+
+void set_image(TIFF* tiff, const RawDn& raw, DngCompression compression) {
   const int samples = samples_of(raw.layout);
   const bool mosaic = raw.layout == SensorLayout::bayer;
   TIFFSetField(tiff, TIFFTAG_SUBFILETYPE, 0);
@@ -40,10 +69,9 @@ void set_image(TIFF* tiff, const RawDn& raw, int rows_per_strip) {
   TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, static_cast<int>(8 * raw.sample_bytes()));
   if (raw.is_float()) TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP);
   TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, samples);
-  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_NONE);
   TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, mosaic ? PHOTOMETRIC_CFA : photometric_linear_raw);
   TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
-  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, rows_per_strip);
+  set_storage(tiff, raw, compression);
   if (!mosaic) return;
   constexpr std::array<std::uint16_t, 2> cell{2, 2};
   constexpr std::array<std::uint8_t, 3> planes{0, 1, 2};  // R, G, B
@@ -119,16 +147,64 @@ void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, cons
 }
 
 template <class Sample>
-bool write_strips(TIFF* tiff, const PlaneView<const Sample>& dn, int rows_per_strip) {
+bool write_strips(TIFF* tiff, const PlaneView<const Sample>& dn, int strip_rows) {
   std::uint32_t index = 0;
-  for (int y = 0; y < dn.height; y += rows_per_strip, ++index) {
-    const int rows = std::min(rows_per_strip, dn.height - y);
+  for (int y = 0; y < dn.height; y += strip_rows, ++index) {
+    const int rows = std::min(strip_rows, dn.height - y);
     const auto size = static_cast<tmsize_t>(sizeof(Sample) * dn.width * rows);
     // libtiff's interface is not const-correct; it only reads data that needs no change of byte order.
     auto* samples = const_cast<Sample*>(dn.row(y));
     if (TIFFWriteEncodedStrip(tiff, index, samples, size) != size) return false;
   }
   return true;
+}
+
+/// Copies the part of an image that a tile covers. What lies outside repeats the last pixels, which takes few bits.
+template <class Sample>
+void copy_tile(const PlaneView<const Sample>& dn, int x, int y, int components, const PlaneView<Sample>& tile) {
+  const int width = std::min(tile.width, dn.width - x), height = std::min(tile.height, dn.height - y);
+  for (int row = 0; row < height; ++row) {
+    Sample* to = tile.row(row);
+    std::copy_n(dn.row(y + row) + x, width, to);
+    for (int i = width; i < tile.width; ++i) to[i] = to[std::max(i - components, 0)];
+  }
+  for (int row = height; row < tile.height; ++row) {
+    const Sample* above = tile.row(row - 1);
+    for (int i = 0; i < tile.width; ++i) tile.row(row)[i] = above[i % components];
+  }
+}
+
+bool write_tile(TIFF* tiff, std::uint32_t index, PlaneView<float> tile, int /*components*/) {
+  const tmsize_t size = TIFFTileSize(tiff);
+  return TIFFWriteEncodedTile(tiff, index, tile.data, size) == size;
+}
+
+bool write_tile(TIFF* tiff, std::uint32_t index, const PlaneView<std::uint16_t>& tile, int components) {
+  std::vector<std::byte> jpeg = encode_lossless_jpeg(tile, components);
+  const auto size = static_cast<tmsize_t>(jpeg.size());
+  return TIFFWriteRawTile(tiff, index, jpeg.data(), size) == size;
+}
+
+/// Writes compressed tiles. Rows of a mosaic are stored as two components of half the width, so that lossless JPEG
+/// predicts samples from those of their own colour.
+template <class Sample>
+bool write_tiles(TIFF* tiff, const RawDn& raw, const PlaneView<const Sample>& dn) {
+  const int samples = samples_of(raw.layout), components = raw.layout == SensorLayout::bayer ? 2 : samples;
+  Plane<Sample> tile(tile_width(raw) * samples, max_tile_side);
+  std::uint32_t index = 0;
+  for (int y = 0; y < dn.height; y += tile.height()) {
+    for (int x = 0; x < dn.width; x += tile.width(), ++index) {
+      copy_tile(dn, x, y, components, tile.view());
+      if (!write_tile(tiff, index, tile.view(), components)) return false;
+    }
+  }
+  return true;
+}
+
+bool write_samples(TIFF* tiff, const RawDn& raw) {
+  return with_samples(raw, [&](const auto& dn) {
+    return TIFFIsTiled(tiff) != 0 ? write_tiles(tiff, raw, dn) : write_strips(tiff, dn, rows_per_strip(raw));
+  });
 }
 
 /// Pads the file: dcraw and its descendants read 512 bytes where a description begins, and treat the end of the file as
@@ -143,21 +219,19 @@ Result<void> pad(std::FILE* file) {
 Result<void> encode(const RawFrame& frame, const DngWriteOptions& options, std::FILE* file) {
   FrameInfo info = written_info(frame.raw.info, options.software);
   info.orientation = frame.raw.info.orientation;
-  const std::size_t row_bytes = frame.raw.sample_bytes() * frame.raw.row_samples();
-  const int rows = static_cast<int>(std::clamp<std::size_t>(tiff_strip_bytes / row_bytes, 1, frame.raw.rows()));
   TiffOutput output(file, false);
   TIFF* tiff = output.handle();
   if (tiff == nullptr) return output.finish(false);
   const std::uint64_t exif = write_tiff_exif(tiff, info);
   declare_dng_tags(tiff);
-  set_image(tiff, frame.raw, rows);
+  set_image(tiff, frame.raw, options.compression);
   set_identity(tiff, frame, info, options);
   set_dng_levels(tiff, frame.raw);
   if (frame.raw.layout != SensorLayout::monochrome) set_dng_colour(tiff, frame.colour);
   TIFFSetField(tiff, TIFFTAG_BASELINEEXPOSURE, baseline_exposure_ev(frame, options));
   set_dng_noise_and_opcodes(tiff, frame);
   if (exif != 0) TIFFSetField(tiff, TIFFTAG_EXIFIFD, exif);
-  const bool stored = with_samples(frame.raw, [&](const auto& dn) { return write_strips(tiff, dn, rows); });
+  const bool stored = write_samples(tiff, frame.raw);
   return output.finish(stored && TIFFWriteDirectory(tiff) != 0)
       .and_then([&] { return add_tags_of_source(file, frame); })
       .and_then([&] { return pad(file); });

@@ -10,6 +10,11 @@
 
 namespace lowlux::isp {
 
+enum class DngCompression : std::uint8_t {
+  none,
+  lossless,  // lossless JPEG of 16-bit samples in tiles; Deflate of floats
+};
+
 struct DngWriteOptions {
   Overwrite overwrite = Overwrite::no;
   std::string software = "lowlux";  // with its version; replaces the name in the frame
@@ -21,10 +26,11 @@ struct DngWriteOptions {
   /// states; the sum is -100 to 100. For a merge of exposures the ratio of the exposure that the image is to have to
   /// the one that white belongs to.
   double baseline_exposure_ev = 0;
+  DngCompression compression = DngCompression::none;
 };
 
 /// Writes a raw frame as DNG 1.4, completely or not at all: 16 bits, or 32-bit floats if the frame has floating-point
-/// samples, uncompressed, in adjacent strips of about 1 MB. Floats are preserved bit by bit.
+/// samples, by default uncompressed, in adjacent strips of about 1 MB. Samples are preserved bit by bit.
 /// Mosaics and monochrome have one sample per pixel, SensorLayout::linear_rgb three. Every figure of the frame that has
 /// a DNG tag is written; what is absent stays absent. Its source tags are written as they are, those of the camera
 /// profile only with its colour matrices; their UniqueCameraModel takes the place of make and model. Rationals are

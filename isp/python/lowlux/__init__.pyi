@@ -165,6 +165,7 @@ def write_dng(
     iso: Optional[float] = ...,
     like: Optional[RawImage] = ...,
     overwrite: bool = ...,
+    compression: Optional[Literal["none", "lossless"]] = ...,
 ) -> None: ...
 
 def develop(
@@ -234,6 +235,7 @@ def denoise(
     output: Optional[_Path] = ...,
     *,
     overwrite: bool = ...,
+    compression: Optional[Literal["none", "lossless"]] = ...,
     black: Union[str, float, _Numbers, _Path, None] = ...,
     profile: Optional[_Path] = ...,
     gain_setting: Optional[str] = ...,
@@ -256,6 +258,7 @@ def merge(
     output: Optional[_Path] = ...,
     *,
     overwrite: bool = ...,
+    compression: Optional[Literal["none", "lossless"]] = ...,
     align: Optional[Literal["auto", "none", "cells", "subpixel", "stars"]] = ...,
     foreground: Optional[Literal["move", "keep"]] = ...,
     drizzle: Optional[float] = ...,

@@ -72,18 +72,21 @@ def raw_from_array(mosaic, *, black=None, white=None, cfa=None, noise=None, matr
 
 
 def write_dng(path, mosaic, *, black=None, white=None, cfa=None, noise=None, matrix=None, exposure_s=None, iso=None,
-              like=None, overwrite=False):
+              like=None, overwrite=False, compression=None):
     """Write a DNG of 16-bit codes, or of 32-bit floats if the samples are floats, completely or not at all.
 
     path: ends with .dng; an existing file is an ExistsError unless overwrite is True.
     mosaic: an array, with the other arguments as in raw_from_array; or a RawImage, without them. Its sides are of 22 to
         64000 px, of floats of up to 65535 px: others are not read again.
+    compression: "none" (default) or "lossless".
     Errors: those of raw_from_array; ExistsError, UnwritableError, TooLargeError.
     """
     path = bytes_of(path, "path")
     if not path.endswith(b".dng"):
         name = os.fsdecode(path)
         raise _errors.ArgumentError(f"{name}: a raw file is written as DNG: its name ends with .dng", name)
+    if compression not in (None, "none", "lossless"):
+        raise _errors.ArgumentError(f'compression: {compression!r} is neither "none" nor "lossless"', "compression")
     figures = dict(black=black, white=white, cfa=cfa, noise=noise, matrix=matrix, exposure_s=exposure_s, iso=iso,
                    like=like)
     if isinstance(mosaic, RawImage):
@@ -93,7 +96,7 @@ def write_dng(path, mosaic, *, black=None, white=None, cfa=None, noise=None, mat
         frame = mosaic
     else:
         frame = raw_from_array(mosaic, **figures)
-    _lowlux.write_dng(frame, path, overwrite)
+    _lowlux.write_dng(frame, path, overwrite, compression == "lossless")
 
 
 def _colours(raw, rows, columns):

@@ -113,13 +113,13 @@ def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, expos
     return Developed(image, json.loads(plan), found.get("noise"), found.get("confidence"), found.get("seeing"))
 
 
-def denoise(raw, output=None, *, overwrite=False, black=None, profile=None, gain_setting=None, noise=None,
-            dark_estimate=None, repair=None, denoise=None, line_noise=None, chroma_bias=None, dark_frame=None,
-            bias_frame=None, dark_frame_count=None, dark_noise=None, dark_doubling=None, maps=False):
+def denoise(raw, output=None, *, overwrite=False, compression=None, black=None, profile=None, gain_setting=None,
+            noise=None, dark_estimate=None, repair=None, denoise=None, line_noise=None, chroma_bias=None,
+            dark_frame=None, bias_frame=None, dark_frame_count=None, dark_noise=None, dark_doubling=None, maps=False):
     """Subtract noise, dark charge and defects from a raw frame, as `lowlux denoise` does with the same options.
 
     raw: a path or a RawImage, which is not changed.
-    output: DNG to write, with its maps next to it; None writes nothing.
+    output: DNG to write, with its maps next to it; None writes nothing. compression: "none" (default) or "lossless".
     denoise: "auto", "draft", "standard", "high" or "best".
     All other options are those of develop.
     Returns Denoised, whose noise property states the residual noise. Errors: those of develop; noise that is not known.
@@ -130,14 +130,14 @@ def denoise(raw, output=None, *, overwrite=False, black=None, profile=None, gain
     return Denoised(clean, json.loads(plan), found.get("noise"), found.get("confidence"))
 
 
-def merge(raws, output=None, *, overwrite=False, align=None, foreground=None, drizzle=None, pixfrac=None, mean=None,
-          reference=None, false_alarm=None, black=None, profile=None, gain_setting=None, noise=None, dark_estimate=None,
-          repair=None, line_noise=None, dark_frame=None, bias_frame=None, dark_frame_count=None, dark_noise=None,
-          dark_doubling=None, flat_frame=None, budget_ms=None):
+def merge(raws, output=None, *, overwrite=False, compression=None, align=None, foreground=None, drizzle=None,
+          pixfrac=None, mean=None, reference=None, false_alarm=None, black=None, profile=None, gain_setting=None,
+          noise=None, dark_estimate=None, repair=None, line_noise=None, dark_frame=None, bias_frame=None,
+          dark_frame_count=None, dark_noise=None, dark_doubling=None, flat_frame=None, budget_ms=None):
     """Merge frames of one scene to one with less noise, as `lowlux merge` does with the same options.
 
     raws: paths or RawImages, which are not changed.
-    output: DNG to write; None writes nothing.
+    output: DNG to write; None writes nothing. compression: "none" (default) or "lossless".
     align: "auto", "none", "cells", "subpixel" or "stars". mean: "robust" or "plain".
     reference: the path or the RawImage among raws to which the others are aligned.
     All other options are described by `lowlux merge --help`.

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "tests/support/dng/lossless_jpeg.h"
+#include "isp/base/plane.h"
+#include "isp/codec/lossless_jpeg.h"
 
 namespace lowlux::test {
 namespace {
@@ -33,20 +35,16 @@ std::vector<std::byte> packed_rows(const DngBuilder& dng, const std::vector<std:
 /// Encodes one tile or strip as lossless JPEG; what lies outside of the image repeats its last row and column.
 std::vector<std::byte> jpeg_part(const DngBuilder& dng, const std::vector<std::uint16_t>& pixels, int x0, int y0,
                                  int width, int height) {
-  JpegSamples jpeg;
-  jpeg.components = dng.samples == 1 ? dng.jpeg_components : dng.samples;
-  jpeg.columns = width * dng.samples / jpeg.components;
-  jpeg.rows = height;
-  jpeg.precision = dng.bits;
+  const int components = dng.samples == 1 ? dng.jpeg_components : dng.samples;
+  Plane<std::uint16_t> part(width * dng.samples / components * components, height);
   for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const int from_x = std::min(x0 + x, dng.width - 1), from_y = std::min(y0 + y, dng.height - 1);
-      for (int s = 0; s < dng.samples; ++s) {
-        jpeg.samples.push_back(pixels[(static_cast<std::size_t>(from_y) * dng.width + from_x) * dng.samples + s]);
-      }
+    for (int i = 0; i < part.width(); ++i) {
+      const int from_x = std::min(x0 + i / dng.samples, dng.width - 1), from_y = std::min(y0 + y, dng.height - 1);
+      const std::size_t pixel = static_cast<std::size_t>(from_y) * dng.width + from_x;
+      part.view().row(y)[i] = pixels[pixel * dng.samples + i % dng.samples];
     }
   }
-  return encode_lossless_jpeg(jpeg);
+  return isp::encode_lossless_jpeg(std::as_const(part).view(), components, dng.bits);
 }
 
 std::vector<std::vector<std::byte>> image_parts(const DngBuilder& dng) {
