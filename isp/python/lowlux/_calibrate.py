@@ -5,6 +5,7 @@ import os
 import numpy as np
 
 from . import _lowlux
+from ._frames import on_disk
 from ._words import bytes_of, output_of, words_of
 from .errors import ArgumentError
 
@@ -79,8 +80,8 @@ def calibrate(kind, frames=(), output=None, *, overwrite=False, **options):
 
     kind: "black" (of dark frames), "noise" (of pairs of flats with darks=, or of one image), "colour" (of a chart, or of
         the spectral sensitivities camera=), or "quoted" (frames is the name of a sensor).
-    frames: a path or a list of paths. output: profile to write (JSON); None writes nothing.
-    options: those of `lowlux calibrate KIND --help`, with _ for -: darks=[...], exposure_time= [s], iso=, add_to=...
+    frames: a path or a RawImage, or a list of them. output: profile to write (JSON); None writes nothing.
+    options: those of `lowlux calibrate KIND --help`, with _ for -: darks= (like frames), exposure_time= [s], iso=...
     Returns the Profile. Errors: ArgumentError for options and unknown sensors; InsufficientError; those of reading.
     """
     if kind not in ["black", "colour", "noise", "quoted"]:
@@ -88,10 +89,12 @@ def calibrate(kind, frames=(), output=None, *, overwrite=False, **options):
     for name in sorted(_OF_THE_COMMAND.intersection(options)):
         raise ArgumentError(f"{name}: it is an option of the command only", name)
     path = output_of(output)
-    named = frames if isinstance(frames, (list, tuple)) else [frames]
-    words = [*words_of(options, ("darks",)), b"--output=" + (path or b"none.json")]
-    words += [b"--", *(bytes_of(frame, "frames") for frame in named)] if named else []
-    text, warnings = _lowlux.calibrate(kind, path, overwrite, words)
-    profile = Profile(json.loads(text), warnings)
+    with on_disk({**options, "frames": frames}, ("frames", "darks")) as (options, named):
+        frames = options.pop("frames")
+        frames = frames if isinstance(frames, (list, tuple)) else [frames]
+        words = [*words_of(options, ("darks",)), b"--output=" + (path or b"none.json")]
+        words += [b"--", *(bytes_of(frame, "frames") for frame in frames)] if frames else []
+        text, warnings = _lowlux.calibrate(kind, path, overwrite, words)
+    profile = Profile(json.loads(text), [named(warning) for warning in warnings])
     profile.path = os.fsdecode(path) if path else None
     return profile

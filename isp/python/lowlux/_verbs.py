@@ -7,6 +7,7 @@ from typing import Optional
 import numpy as np
 
 from . import _lowlux
+from ._frames import on_disk
 from ._words import input_of, inputs_of, output_of, words_of
 from .errors import ArgumentError
 
@@ -100,7 +101,8 @@ def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, expos
     black: "auto", "metadata", "masked", one level or four of the 2x2 cell [DN], or a profile.
     noise: (system gain [DN/e-], read noise [e-]). baseline_exposure: "on" or "off".
     denoise: "auto", "off", "draft", "standard", "high" or "best".
-    dark_frame, bias_frame, flat_frame: a path or a list of paths. scene_luminance, display_luminance: [cd/m2].
+    dark_frame, bias_frame, flat_frame: a path or a RawImage, or a list of them.
+    scene_luminance, display_luminance: [cd/m2].
     budget_ms: time for the frame [ms]. drizzle: width of the result over that of a frame, 1 to 3.
     All other options are described by `lowlux develop --help`: the option --field-of-view is field_of_view.
     Returns Developed. Errors: ArgumentError for options; those of read_raw, and of writing.
@@ -108,9 +110,10 @@ def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, expos
     options = {name: value for name, value in locals().items() if name not in ("raw", "output", "overwrite")}
     several = isinstance(raw, (list, tuple))
     inputs = inputs_of(raw) if several else [input_of(raw)]
-    words = words_of({**options, "merge": several, "reference": _reference(reference, inputs)}, _FILES)
-    image, plan, found = _call(_lowlux.develop, inputs, output, overwrite, words)
-    return Developed(image, json.loads(plan), found.get("noise"), found.get("confidence"), found.get("seeing"))
+    options.update(merge=several, reference=_reference(reference, inputs))
+    with on_disk(options, _FILES) as (options, named):
+        image, plan, found = _call(_lowlux.develop, inputs, output, overwrite, words_of(options, _FILES))
+    return Developed(image, json.loads(named(plan)), found.get("noise"), found.get("confidence"), found.get("seeing"))
 
 
 def denoise(raw, output=None, *, overwrite=False, compression=None, black=None, profile=None, gain_setting=None,
@@ -126,8 +129,9 @@ def denoise(raw, output=None, *, overwrite=False, compression=None, black=None, 
     """
     options = {name: value for name, value in locals().items() if name not in ("raw", "output", "overwrite")}
     _check_dng(output)
-    clean, plan, found = _call(_lowlux.denoise, [input_of(raw)], output, overwrite, words_of(options, _FILES))
-    return Denoised(clean, json.loads(plan), found.get("noise"), found.get("confidence"))
+    with on_disk(options, _FILES) as (options, named):
+        clean, plan, found = _call(_lowlux.denoise, [input_of(raw)], output, overwrite, words_of(options, _FILES))
+    return Denoised(clean, json.loads(named(plan)), found.get("noise"), found.get("confidence"))
 
 
 def merge(raws, output=None, *, overwrite=False, compression=None, align=None, foreground=None, drizzle=None,
@@ -147,8 +151,9 @@ def merge(raws, output=None, *, overwrite=False, compression=None, align=None, f
     _check_dng(output)
     inputs = inputs_of(raws)
     options["reference"] = _reference(reference, inputs)
-    raw, plan, warnings = _call(_lowlux.merge, inputs, output, overwrite, words_of(options, _FILES))
-    return Merged(raw, json.loads(plan), warnings)
+    with on_disk(options, _FILES) as (options, named):
+        raw, plan, warnings = _call(_lowlux.merge, inputs, output, overwrite, words_of(options, _FILES))
+    return Merged(raw, json.loads(named(plan)), [named(warning) for warning in warnings])
 
 
 def _check_dng(output):
