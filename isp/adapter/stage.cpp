@@ -322,8 +322,9 @@ int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& ou
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
   if (answers.result != nullptr) {
     tell(facts, *answers.result);
-    const PerSite<double>& black_dn = pipeline.decided().levels.black.pedestal_dn;
-    if (stream_->exposure->advise(pipeline.frame().raw, black_dn, params, *answers.result)) {
+    const MeteredBlack black{pipeline.decided().levels.black.pedestal_dn,
+                             pipeline.decision().black == LiveSource::frame};
+    if (stream_->exposure->advise(pipeline.frame().raw, black, params, *answers.result)) {
       answers.result->applied |= LOWLUX_STAGE_HAS_EXPOSURE_LIMITS;
     }
     answers.result->took_ms = static_cast<float>(took.count());

@@ -42,7 +42,12 @@ std::vector<double> StageExposure::factors() {
 StageExposure::StageExposure(const RawFormat& format, std::vector<GainStep> gains)
     : meter_(format), controller_({.gains = std::move(gains), .limits = {}, .at = {}}) {}
 
-bool StageExposure::advise(const RawDn& raw, const PerSite<double>& black_dn, const lowlux_stage_params& params,
+void StageExposure::reset() {
+  is_running_ = false;
+  lowest_dn_.reset();
+}
+
+bool StageExposure::advise(const RawDn& raw, MeteredBlack black, const lowlux_stage_params& params,
                            lowlux_stage_result& out) {
   constexpr std::uint32_t needed =
       LOWLUX_STAGE_HAS_EXPOSURE_LIMITS | LOWLUX_STAGE_HAS_EXPOSURE | LOWLUX_STAGE_HAS_ANALOGUE_GAIN;
@@ -62,9 +67,14 @@ bool StageExposure::advise(const RawDn& raw, const PerSite<double>& black_dn, co
   // The black level includes the mean dark charge, which the controller subtracts by its own model.
   const GainStep& step = controller_.gains()[controller_.gain_near(factor)];
   const double dn_per_e = step.sensor.system_gain_dn_per_e * factor / step.factor;
-  PerSite<double> pedestal_dn = black_dn;
-  for (double& site_dn : pedestal_dn) site_dn -= dark_e_per_s(step, limits) * params.exposure_s * dn_per_e;
-  controller_.take(meter_.codes(pedestal_dn, raw.white_dn[1], limits.clipped_fraction),
+  for (double& site_dn : black.dn) site_dn -= dark_e_per_s(step, limits) * params.exposure_s * dn_per_e;
+  if (black.is_bound) {
+    if (!lowest_dn_) lowest_dn_ = black.dn;
+    for (int site = 0; site < 4; ++site) {
+      black.dn[site] = (*lowest_dn_)[site] = std::max(0.0, std::min(black.dn[site], (*lowest_dn_)[site]));
+    }
+  }
+  controller_.take(meter_.codes(black, raw.white_dn[1], limits.clipped_fraction),
                    StatedExposure{params.exposure_s, factor});
   const ExposureSetting& setting = controller_.setting();
   out.advised_exposure_s = static_cast<float>(setting.exposure_s);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "isp/adapter/lowlux_stage.h"
@@ -22,17 +23,17 @@ class StageExposure {
 
   /// Measures a frame, and fills in the advice if exposure time, gain and limits are valid in `params`. Allocates
   /// nothing.
-  /// @param black_dn  of the sites of the active area, dark charge included
+  /// @param black  of the sites of the active area, dark charge included; of bounds the lowest since reset() counts
   /// @return whether there is advice
-  bool advise(const RawDn& raw, const PerSite<double>& black_dn, const lowlux_stage_params& params,
-              lowlux_stage_result& out);
+  bool advise(const RawDn& raw, MeteredBlack black, const lowlux_stage_params& params, lowlux_stage_result& out);
 
-  /// Forgets the light.
-  void reset() { is_running_ = false; }
+  /// Forgets the light and the bounds of black.
+  void reset();
 
  private:
   ExposureMeter meter_;
   ExposureController controller_;
+  std::optional<PerSite<double>> lowest_dn_;  // lowest upper bound of the pedestal
   bool is_running_ = false;
 };
 

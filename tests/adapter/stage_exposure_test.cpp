@@ -86,6 +86,41 @@ TEST(StageExposure, AdvisesAnExposureAtWhichItStays) {
   }
 }
 
+// A wall without a dark place: nothing states black, and each frame shows its own light as black.
+TEST(StageExposure, SettlesWhereBlackIsNotKnownAndNothingIsBlack) {
+  std::printf("seed 7\n");
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  for (const double e_per_s : {3e4, 2e5, 2e6}) {
+    Rig rig(plain_settings(), names(), width, height, LOWLUX_STAGE_BGR888);
+    double exposure_s = 0.01, gain = 1;
+    int last_change = 0;
+    double clipped = 1;
+    for (int i = 0; i < 60; ++i) {
+      Codes codes(width * height);
+      const double e = e_per_s * exposure_s;
+      for (std::size_t p = 0; p < codes.size(); ++p) {
+        const double light = e * (1 - 0.3 * static_cast<double>(p % width) / width);
+        const double dn = 256 + 0.1 * gain * (light + std::sqrt(light + 9) * normal(random));
+        codes[p] = static_cast<std::uint16_t>(std::clamp(std::round(dn), 0.0, 4095.0));
+      }
+      auto params = params_of(exposure_s, gain);
+      params.valid &= ~static_cast<std::uint32_t>(LOWLUX_STAGE_HAS_BLACK);
+      params.mains_hz = 0;
+      ASSERT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK);
+      if (std::abs(rig.result.advised_exposure_s / exposure_s - 1) > 1e-6 ||
+          std::abs(rig.result.advised_gain - gain) > 1e-6) {
+        last_change = i;
+      }
+      clipped = rig.statistics.clipped;
+      exposure_s = rig.result.advised_exposure_s;
+      gain = rig.result.advised_gain;
+    }
+    EXPECT_LT(last_change, 30) << e_per_s;
+    EXPECT_LT(clipped, 0.01) << e_per_s;
+  }
+}
+
 /// The sensor of night(), with a dark current.
 CameraProfile profile_of_night(double dark_e_per_s) {
   CameraProfile out;

@@ -54,15 +54,21 @@ TEST(ExposureMeter, FindsMedianAndHighlightOfTheChannelsThatHaveMost) {
     ExposureMeter meter(format_of(bits));
     frame.meter(meter);
     const PerSite<double> black{0.05 * largest, 0.06 * largest, 0.07 * largest, 0.08 * largest};
-    const MeteredCodes codes = meter.codes(black, largest, 0.01);
+    const MeteredCodes codes = meter.codes({black}, largest, 0.01);
     const int pixels = width * height / 4;
     EXPECT_NEAR(codes.midtone_dn, frame.exceeded(1, pixels / 2) - black[1], code) << bits;
-    double highlight = 0;
-    for (int site = 0; site < 4; ++site)
+    double highlight = 0, highest = 0;
+    for (int site = 0; site < 4; ++site) {
       highlight = std::max(highlight, frame.exceeded(site, pixels / 100) - black[site]);
+      highest = std::max<double>(highest, frame.exceeded(site, pixels / 100));
+    }
     EXPECT_NEAR(codes.highlight_dn, highlight, code) << bits;
     EXPECT_EQ(codes.clipped_fraction, 0);
     EXPECT_NEAR(codes.range_dn, largest - black[3], 1e-9);
+    const MeteredCodes of_bound = meter.codes({black, true}, largest, 0.01);
+    EXPECT_EQ(of_bound.midtone_dn, codes.midtone_dn);
+    EXPECT_NEAR(of_bound.highlight_dn, highest, code) << bits;
+    EXPECT_EQ(of_bound.range_dn, largest);
     for (int site = 0; site < 4; ++site) {
       EXPECT_NEAR(meter.darkest_dn()[site], frame.exceeded(site, pixels * 99 / 100), code) << bits;
     }
@@ -115,7 +121,7 @@ TEST(ExposureMeter, TakesMonochromeFramesAsOneChannel) {
   for (std::size_t i = 0; i < frame.dn.size(); ++i) frame.dn[i] = static_cast<std::uint16_t>(i % 1000);
   ExposureMeter meter(format_of(12, SensorLayout::monochrome));
   frame.meter(meter);
-  const MeteredCodes codes = meter.codes({16, 0, 0, 0}, 4095, 0.01);
+  const MeteredCodes codes = meter.codes({{16, 0, 0, 0}}, 4095, 0.01);
   EXPECT_NEAR(codes.midtone_dn, 500 - 16, 35);  // 6144 pixels: six ramps of 1000 and the start of a seventh
   EXPECT_NEAR(codes.highlight_dn, 990 - 16, 2);
 }

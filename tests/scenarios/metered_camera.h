@@ -63,7 +63,7 @@ struct MeteredCamera {
     black.fill(sensor.black_level_dn);
     std::optional<isp::StatedExposure> stated;
     if (states) stated = {at.exposure_s, setup.gains[at.gain].factor};
-    controller.take(meter.codes(black, sensor.white_level_dn, setup.limits.clipped_fraction), stated);
+    controller.take(meter.codes({black}, sensor.white_level_dn, setup.limits.clipped_fraction), stated);
     waiting.push_back(controller.setting());
     in_effect = at;
     ++frame;

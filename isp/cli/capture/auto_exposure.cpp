@@ -104,18 +104,18 @@ Result<void> AutoExposure::set(const isp::ExposureSetting& setting) {
   return {};
 }
 
-PerSite<double> AutoExposure::black_of(const capture::FrameFacts& facts) {
-  if (black_dn_) return *black_dn_;
-  PerSite<double> out{};
+isp::MeteredBlack AutoExposure::black_of(const capture::FrameFacts& facts) {
+  if (black_dn_) return {*black_dn_};
+  isp::MeteredBlack out;
   const RawFormat& format = camera_.format().raw;
   if (facts.black_level_dn) {
-    for (int site = 0; site < 4; ++site) out[site] = (*facts.black_level_dn)[black_channel_of(site, format.phase)];
+    for (int site = 0; site < 4; ++site) out.dn[site] = (*facts.black_level_dn)[black_channel_of(site, format.phase)];
     return out;
   }
   const PerSite<double> darkest = meter_.darkest_dn();
   if (!darkest_dn_) darkest_dn_.emplace().fill(most_black * largest_code(format));
   for (int site = 0; site < 4; ++site) (*darkest_dn_)[site] = std::min((*darkest_dn_)[site], darkest[site]);
-  return *darkest_dn_;
+  return {*darkest_dn_, true};
 }
 
 isp::MeteredCodes AutoExposure::meter(const capture::CameraFrame& frame) {

@@ -46,7 +46,7 @@ class AutoExposure {
                std::optional<PerSite<double>> black_dn);
   Result<void> set(const isp::ExposureSetting& setting);
   isp::MeteredCodes meter(const capture::CameraFrame& frame);
-  PerSite<double> black_of(const capture::FrameFacts& facts);
+  isp::MeteredBlack black_of(const capture::FrameFacts& facts);
   std::optional<isp::StatedExposure> stated_by(const capture::FrameFacts& facts) const;
 
   capture::Camera& camera_;

@@ -75,7 +75,7 @@ void ExposureMeter::find_saturation(const Site& site, double white_dn, double fr
   if (is_pile && top_dn > white_dn / 2) saturation_dn_ = std::min(saturation_dn_, top_dn);
 }
 
-MeteredCodes ExposureMeter::codes(const PerSite<double>& black_dn, double white_dn, double fraction) {
+MeteredCodes ExposureMeter::codes(const MeteredBlack& black, double white_dn, double fraction) {
   const int sites = is_bayer_ ? 4 : 1;
   for (int i = 0; i < sites; ++i) find_saturation(sites_[static_cast<std::size_t>(i)], white_dn, fraction);
   const double top_dn = std::clamp<double>(std::min(white_dn, saturation_dn_), 1, largest_);
@@ -84,14 +84,15 @@ MeteredCodes ExposureMeter::codes(const PerSite<double>& black_dn, double white_
   double most_dn = 0;
   for (int i = 0; i < sites; ++i) {
     const Site& site = sites_[static_cast<std::size_t>(i)];
-    const double mean_dn = mean_of(site.sum, site.pixels) - black_dn[i];
-    const double highlight_dn = exceeded_dn(site, fraction) - black_dn[i];
+    const double floor_dn = black.is_bound ? 0 : black.dn[i];
+    const double mean_dn = mean_of(site.sum, site.pixels) - black.dn[i];
+    const double highlight_dn = exceeded_dn(site, fraction) - floor_dn;
     if (i == 0 || mean_dn > most_dn) {
       most_dn = mean_dn;
-      out.midtone_dn = exceeded_dn(site, 0.5) - black_dn[i];
+      out.midtone_dn = exceeded_dn(site, 0.5) - black.dn[i];
     }
     out.highlight_dn = i == 0 ? highlight_dn : std::max(out.highlight_dn, highlight_dn);
-    out.range_dn = i == 0 ? top_dn - black_dn[i] : std::min(out.range_dn, top_dn - black_dn[i]);
+    out.range_dn = i == 0 ? top_dn - floor_dn : std::min(out.range_dn, top_dn - floor_dn);
     const std::uint64_t clipped =
         std::accumulate(site.count.begin() + static_cast<std::ptrdiff_t>(white), site.count.end(), std::uint64_t{0});
     out.clipped_fraction = std::max(out.clipped_fraction, mean_of(clipped, site.pixels));

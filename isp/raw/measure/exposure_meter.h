@@ -13,6 +13,14 @@
 
 namespace lowlux::isp {
 
+/// Holds the black level of each site of a frame.
+struct MeteredBlack {
+  PerSite<double> dn{};
+  /// States that black is only an upper bound: the dark pixels of a scene, which may have no dark area. Frames of
+  /// another exposure then have another bound, and predictions above it would be wrong.
+  bool is_bound = false;
+};
+
 /// Counts the codes of some rows of a frame, by site of the mosaic, to set the exposure of the next frames by. All
 /// memory is allocated in the constructor.
 class ExposureMeter {
@@ -30,9 +38,10 @@ class ExposureMeter {
   /// - 12) codes of a bin for more than 12 bits. Sensors may saturate below the largest code: where twice `fraction` of
   /// the pixels, and 32 or more, have the largest code of the frame, four times as many as have the code below, and it
   /// lies in the upper half of the range, it counts as white for this frame and those after it.
-  /// @param black_dn  of the sites
+  /// @param black  where it is a bound, highlight and range count from code 0: codes are then never predicted too low
+  /// for more light, and exposures that approach white do so from below
   /// @param fraction  of the pixels, which exceed the highlight
-  MeteredCodes codes(const PerSite<double>& black_dn, double white_dn, double fraction);
+  MeteredCodes codes(const MeteredBlack& black, double white_dn, double fraction);
 
  private:
   static constexpr int bits = 12;

@@ -70,8 +70,9 @@ class NightCamera final : public capture::Camera {
   std::optional<Error> error;
   bool states = false;
   std::uint32_t latency = 3;
-  double longest_s = 1;  // the driver's own limit
-  double e_per_s = 200;  // of the mid tone; the highlight has twenty times as many
+  double longest_s = 1;   // the driver's own limit
+  double e_per_s = 200;   // of the mid tone
+  double highlight = 20;  // times as many
   int sets = 0, failing_set = -1;
   CameraExposure now{.exposure_s = 0.001, .gain = CameraGain{}};
 
@@ -81,7 +82,7 @@ class NightCamera final : public capture::Camera {
     std::normal_distribution<double> normal;
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
-        const double e = e_per_s * (x < 16 ? 20 : 1) * now.exposure_s;
+        const double e = e_per_s * (x < 16 ? highlight : 1) * now.exposure_s;
         const double dn = 256 + gain_dn * (e + std::sqrt(e + 9) * normal(random_));
         const auto code = static_cast<std::uint16_t>(std::clamp(std::round(dn), 0.0, 4095.0));
         std::memcpy(bytes_.data() + 2 * static_cast<std::size_t>(y * width + x), &code, 2);
@@ -157,6 +158,29 @@ TEST_F(AutoExposureOfCapture, FindsTheExposureBeforeAFrameIsTaken) {
         EXPECT_EQ(camera.now.gain->factor, 1);
       }
     }
+  }
+}
+
+// A wall without a dark place: nothing states black, and each frame shows its own light as black.
+TEST_F(AutoExposureOfCapture, SettlesWhereBlackIsNotKnownAndNothingIsBlack) {
+  std::printf("seed 17\n");
+  for (const double e_per_s : {4e5, 1e6, 1e7}) {
+    NightCamera camera;
+    camera.highlight = 1.2;
+    camera.e_per_s = e_per_s;
+    auto automatic = cli::AutoExposure::make(args_of({"--max-exposure", "0.1", "--mains", "off"}), camera);
+    ASSERT_TRUE(automatic);
+    int sets = 0;
+    for (int i = 0; i < 160; ++i) {
+      if (i == 100) sets = camera.sets;
+      auto frame = camera.next({});
+      ASSERT_TRUE((*automatic)->take(*frame));
+    }
+    EXPECT_TRUE((*automatic)->found()) << e_per_s;
+    EXPECT_LE(camera.sets, sets + 1) << e_per_s;
+    const double codes = 0.1 * camera.now.gain->factor * 1.2 * e_per_s * camera.now.exposure_s / (4095 - 256);
+    EXPECT_GT(codes, 0.75) << e_per_s;
+    EXPECT_LT(codes, 1.0) << e_per_s;
   }
 }
 
