@@ -69,7 +69,7 @@ Expected expected_of(const RawDn& raw, const RawFormat& format) {
         ++s.count[c];
       }
       ++s.pixels;
-      s.clipped += dn_at(x, y) >= static_cast<std::uint16_t>(raw.white_dn[1]) ? 1 : 0;
+      s.clipped += dn_at(x, y) >= raw.white_dn[1] ? 1 : 0;
       s.zero += dn_at(x, y) == 0 ? 1 : 0;
       if (x % 2 == 0 || y % 4 != 1) continue;  // every second row of cells
       int luma = 0;

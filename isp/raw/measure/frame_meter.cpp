@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 #include "isp/base/packed/raw_format.h"
 #include "isp/raw/measure/meter_rows.h"
@@ -103,7 +104,8 @@ void FrameMeter::measure_row(const RawDn& raw, int y, const MeterWants& wants, i
   const int width = raw.active.width;
   if (wants.statistics) {
     const std::uint16_t* const dn = raw.dn.row(raw.active.y + y) + raw.active.x;
-    const auto found = meter::count_extremes(dn, width, static_cast<std::uint16_t>(raw.white_dn[1]));
+    const auto white = static_cast<std::uint16_t>(std::ceil(raw.white_dn[1]));  // codes are whole
+    const auto found = meter::count_extremes(dn, width, white);
     Tally& tally = tallies_[static_cast<std::size_t>(thread)];
     tally.clipped += found.clipped;
     tally.zero += found.zero;

@@ -99,7 +99,7 @@ void ThumbnailSums::add_samples(const Sample* dn, int y, Sample white) {
 }
 
 void ThumbnailSums::add_row(const std::uint16_t* dn, int y) {
-  add_samples(dn, y, static_cast<std::uint16_t>(std::min(65535.0, *std::ranges::min_element(white_dn_))));
+  add_samples(dn, y, static_cast<std::uint16_t>(std::min(65535.0, std::ceil(*std::ranges::min_element(white_dn_)))));
 }
 
 void ThumbnailSums::add_row(const float* dn, int y) {
