@@ -68,11 +68,12 @@ void set_names(GstStructure* structure, const char* field, std::initializer_list
 }
 
 /// Appends pictures of the size of a structure. The stage writes NV12 by the matrix of BT.601 or BT.709, in the range
-/// of video; the usual one of the size comes first.
+/// of video, the usual one of the size first. Its chroma is at the centre of 2x2 pixels, which GStreamer calls "jpeg":
+/// without this name other elements would assume the position of MPEG-2, half a pixel to the left.
 GstCaps* with_pictures(GstCaps* caps, GstStructure* rgb) {
   GstStructure* nv12 = gst_structure_copy(rgb);
   set_names(rgb, "format", {"RGBx", "BGRx", "RGB", "BGR"});
-  gst_structure_set(nv12, "format", G_TYPE_STRING, "NV12", nullptr);
+  gst_structure_set(nv12, "format", G_TYPE_STRING, "NV12", "chroma-site", G_TYPE_STRING, "jpeg", nullptr);
   int height = 0;
   const bool hd = gst_structure_get_int(nv12, "height", &height) != FALSE && height >= 720;
   set_names(nv12, "colorimetry",

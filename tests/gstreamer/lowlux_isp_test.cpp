@@ -436,6 +436,19 @@ TEST(LowluxIsp, PostsWhatWasDoneWhereAsked) {
   gst_element_set_bus(harness->element, nullptr);
 }
 
+TEST(LowluxIsp, NamesTheMatrixAndThePlaceOfChroma) {
+  for (const int height : {48, 720}) {
+    Stream stream;
+    stream.output = "NV12";
+    stream.height = height;
+    const Harness harness = harness_of(stream);
+    ASSERT_EQ(gst_harness_push(harness.get(), buffer_of(frame_of(stream, 1), 0)), GST_FLOW_OK);
+    const GstVideoInfo info = output_of(harness.get()).picture;
+    EXPECT_EQ(info.chroma_site, GST_VIDEO_CHROMA_SITE_JPEG);
+    EXPECT_EQ(info.colorimetry.matrix, height < 720 ? GST_VIDEO_COLOR_MATRIX_BT601 : GST_VIDEO_COLOR_MATRIX_BT709);
+  }
+}
+
 // At either end of the range of each number and between, alone.
 TEST(LowluxIsp, NoValueOfAPropertyEndsTheStream) {
   const Stream stream;
