@@ -118,6 +118,7 @@ gboolean set_caps(GstBaseTransform* element, GstCaps* in_caps, GstCaps* out_caps
   in.fourcc = state.in->fourcc;
   in.width = state.in->width;
   in.height = state.in->height;
+  in.white_level = locked_properties(element).stated_white_dn();
   lowlux_stage_output out{};
   out.size = sizeof out;
   out.fourcc = state.out->fourcc;

@@ -22,10 +22,13 @@ struct Number {
   GParamFlags flags = always;
 };
 
-constexpr std::array<Number, 13> numbers{{
+constexpr std::array<Number, 14> numbers{{
     {"field-of-view", "Field of view",
      "Field of view of the longer side of the image [degrees]; 0: 50. For the look of the eye", 0, 180,
      &Properties::field_of_view_deg, before_start},
+    {"white-level", "White level",
+     "Code at which pixels of the frames are saturated; below 0.001: the largest code of the format", 0, 65535,
+     &Properties::white_level_dn, before_start},
     {"black-level", "Black level", "Black level in codes of the frames; below 0: that of the profile, else measured",
      -1, 65535, &Properties::black_level_dn},
     {"exposure-time", "Exposure time", "Exposure time of the frames [s]; below 1e-7: not known", 0, 1e5,
@@ -97,6 +100,7 @@ GType look_type() {
   return type;
 }
 
+constexpr double least_white_level = 1e-3;
 constexpr double least_noise_gain = 1e-6, least_noise_read = 0, least_colour_gain = 1e-3;  // that are known
 
 }  // namespace
@@ -219,6 +223,8 @@ lowlux_stage_settings Properties::settings() const {
   out.demosaic = demosaic;
   return out;
 }
+
+double Properties::stated_white_dn() const { return white_level_dn < least_white_level ? 0 : white_level_dn; }
 
 // Values below the minimum of the stage are not stated.
 lowlux_stage_params Properties::params() const {

@@ -10,7 +10,7 @@ namespace lowlux::gst {
 
 /// Holds what the properties of an element state.
 struct Properties {
-  // These are settings of the stage, used when the element starts.
+  // These are settings of the stage, used when the element starts, and white when the caps are set.
   std::string profile;
   int threads = 0;
   int level = LOWLUX_STAGE_LEVEL_STANDARD;
@@ -19,6 +19,7 @@ struct Properties {
   bool temporal = false;
   bool tone = true;
   double field_of_view_deg = 0;
+  double white_level_dn = 0;
   // These apply to each frame; values below their ranges mean not known.
   double black_level_dn = -1;
   double exposure_s = 0;
@@ -36,6 +37,8 @@ struct Properties {
 
   lowlux_stage_settings settings() const;
   lowlux_stage_params params() const;
+  /// Returns the white level for lowlux_stage_input; 0 if it is not stated.
+  double stated_white_dn() const;
   /// Returns that a property has no effect because the one it requires is not known, in words; nullptr: none is.
   const char* without_effect() const;
 };

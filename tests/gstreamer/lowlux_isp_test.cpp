@@ -130,9 +130,9 @@ class Reference {
   std::size_t stride_ = 0;
 };
 
-Harness harness_of(const Stream& stream, bool temporal = false, const char* look = "camera") {
+Harness harness_of(const Stream& stream, bool temporal = false, const char* look = "camera", double white_dn = 0) {
   GstElement* element = gst_element_factory_make("lowluxisp", nullptr);
-  g_object_set(element, "temporal", static_cast<gboolean>(temporal), nullptr);
+  g_object_set(element, "temporal", static_cast<gboolean>(temporal), "white-level", white_dn, nullptr);
   gst_util_set_object_arg(G_OBJECT(element), "look", look);
   Harness harness(gst_harness_new_with_element(element, "sink", "src"));
   gst_object_unref(element);
@@ -436,6 +436,35 @@ TEST(LowluxIsp, PostsWhatWasDoneWhereAsked) {
   gst_element_set_bus(harness->element, nullptr);
 }
 
+TEST(LowluxIsp, TakesPixelsAtTheWhiteLevelForSaturated) {
+  Stream stream;
+  stream.output = "RGB";
+  const BayerCaps caps = stream.in();
+  Bytes bytes(caps.stride * static_cast<std::size_t>(stream.height));
+  for (std::size_t i = 0; i < bytes.size(); i += 2) {  // 700 of 1023
+    bytes[i] = 700 & 255;
+    bytes[i + 1] = 700 >> 8;
+  }
+  for (const double white : {0.0, 700.0}) {
+    const Harness harness = harness_of(stream, false, "camera", white);
+    // With these gains an unsaturated pixel is magenta.
+    g_object_set(harness->element, "black-level", 64.0, "red-gain", 2.0, "blue-gain", 2.0, "exposure-ev", 0.0, nullptr);
+    ASSERT_EQ(gst_harness_push(harness.get(), buffer_of(bytes, 0)), GST_FLOW_OK);
+    GstBuffer* image = gst_harness_pull(harness.get());
+    GstMapInfo map{};
+    ASSERT_NE(gst_buffer_map(image, &map, GST_MAP_READ), FALSE);
+    const int red = map.data[0], green = map.data[1];
+    gst_buffer_unmap(image, &map);
+    gst_buffer_unref(image);
+    if (white > 0) {
+      EXPECT_EQ(red, 255);
+      EXPECT_EQ(green, 255);
+    } else {
+      EXPECT_LT(green, 240);
+    }
+  }
+}
+
 TEST(LowluxIsp, NamesTheMatrixAndThePlaceOfChroma) {
   for (const int height : {48, 720}) {
     Stream stream;
@@ -498,7 +527,7 @@ TEST(LowluxIsp, PropertiesAreReturnedAsTheyWereSet) {
     g_value_unset(&set);
     g_value_unset(&got);
   }
-  EXPECT_EQ(checked, 21);
+  EXPECT_EQ(checked, 22);
   g_free(specs);
   gst_object_unref(element);
 }
