@@ -216,6 +216,9 @@ TEST(StageParams, LuxCountOnlyWhereNothingTellsTheLightBetter) {
   EXPECT_NEAR(rig.result.scene_luminance_cd_m2, 0.18 * 2 / M_PI, 1e-6);  // a grey of 18 % under 2 lx; floats
   EXPECT_EQ(rig.result.applied & LOWLUX_STAGE_HAS_LUX, LOWLUX_STAGE_HAS_LUX);
   EXPECT_LT(rig.result.adaptation, 1) << "0.11 cd/m2 are mesopic";
+  params.lux = 1e-20F;
+  ASSERT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK) << rig.error();
+  EXPECT_FLOAT_EQ(rig.result.scene_luminance_cd_m2, 1e-7F) << "as dark as scenes can be";
   params.scene_luminance_cd_m2 = 0.5;
   params.valid |= LOWLUX_STAGE_HAS_SCENE_LUMINANCE;
   ASSERT_EQ(rig.process(codes, params), LOWLUX_STAGE_OK);
