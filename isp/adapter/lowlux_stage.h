@@ -184,27 +184,28 @@ enum {
  * from the profile, else measured on the frame, else left out. */
 typedef struct {
   size_t size;
-  uint32_t valid;         /* LOWLUX_STAGE_HAS_... */
-  float black_level[4];   /* R, Gr, Gb, B, in codes of the input; a 16-bit value v of libcamera is v 2^bits / 65536 */
+  uint32_t valid; /* LOWLUX_STAGE_HAS_... */
+  /* R, Gr, Gb, B, in codes of the input, 0..65535; a 16-bit value v of libcamera is v 2^bits / 65536 */
+  float black_level[4];
   double exposure_s;      /* 1e-7..1e5 */
   float analogue_gain;    /* 0.1..1e4; 1 is ISO 100 of the profile */
   float digital_gain;     /* already applied to the codes, 0.1..1e3; noise scales with it */
-  float colour_gains[2];  /* R and B, relative to G = 1; 1e-3..1e3 */
+  float colour_gains[2];  /* R and B, relative to G = 1; 1e-3..1e3. Only ratios count: the smallest of the three is 1 */
   float colour_matrix[9]; /* rows; white-balanced camera RGB to linear sRGB; each within 1e3 */
-  float lux;              /* illuminance of the scene; gives its luminance if there is no better source */
+  float lux;              /* illuminance of the scene, 0..1e9; gives its luminance if there is no better source */
   float temperature_c;    /* temperature of the sensor, -100..200 */
   int32_t denoise;        /* LOWLUX_STAGE_DENOISE_...; libcamera's ZSL (4) counts as MINIMAL */
   uint32_t sequence;      /* a gap or a step back discards the previous frames */
   uint64_t timestamp_ns;  /* a step back, or one above both 2 s and three exposures, discards the previous frames */
-  float gamma;            /* accepted, without effect: the stage has its own curve */
-  float contrast;         /* accepted, without effect */
+  float gamma;            /* 0..100; accepted, without effect: the stage has its own curve */
+  float contrast;         /* 0..100; accepted, without effect */
   float saturation;       /* 0..4 */
-  float sharpness;        /* accepted, without effect */
+  float sharpness;        /* 0..100; accepted, without effect */
   float exposure_ev;      /* gain 2^EV of the image, -10..20; if not valid: automatic */
-  float noise_gain;       /* DN per electron, at this frame's gain; requires noise_read */
-  float noise_read;       /* standard deviation of a pixel without light, before it is rounded to a code [DN] */
-  float f_number;
-  double scene_luminance_cd_m2; /* mean luminance over the image */
+  float noise_gain;       /* DN per electron, at this frame's gain, 1e-6..65535; requires noise_read */
+  float noise_read; /* standard deviation of a pixel without light, before it is rounded to a code [DN], 0..65535 */
+  float f_number;   /* 0.1..1000 */
+  double scene_luminance_cd_m2; /* mean luminance over the image, 1e-7..1e9 */
   float budget_ms;              /* time limit for this frame, 0.01..1e6; steps that do not fit are left out */
   float max_exposure_s;         /* limits of the exposure that the result advises, 1e-7..1e5: motion blur, frame rate */
   float min_exposure_s;         /* 0..max_exposure_s */
@@ -316,7 +317,8 @@ LOWLUX_STAGE_EXPORT uint32_t lowlux_stage_version(void);
 LOWLUX_STAGE_EXPORT int lowlux_stage_query(int32_t api, uint32_t fourcc, uint64_t modifier,
                                            lowlux_stage_format_info* info);
 
-/* Opens a stage. settings may be null. *stage is null after an error. message, if not null, gets the reason. */
+/* Opens a stage. settings may be null: levels up to draft, the standard tone curve, 0 for all others. *stage is null
+ * after an error. message, if not null, gets the reason. */
 LOWLUX_STAGE_EXPORT int lowlux_stage_open(const lowlux_stage_settings* settings, lowlux_stage** stage, char* message,
                                           size_t message_size);
 
