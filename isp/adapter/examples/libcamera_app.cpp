@@ -1,12 +1,14 @@
 // Processes raw frames of libcamera's first camera by lowlux's stage, with libcamera's public functions alone: an
 // example for applications that develop a raw stream themselves.
-//   lowlux_libcamera_app [FRAMES [PICTURE.ppm]]      30 frames; the last one is written
+//   g++ -std=c++20 libcamera_app.cpp -o libcamera_app $(pkg-config --cflags --libs libcamera lowlux_stage)
+//   ./libcamera_app [FRAMES [PICTURE.ppm]]           30 frames; the last one is written
 // The same source builds with libcamera 0.0.3 to 0.7. Not every camera offers a raw stream.
 #include <libcamera/camera.h>
 #include <libcamera/camera_manager.h>
 #include <libcamera/control_ids.h>
 #include <libcamera/framebuffer_allocator.h>
 #include <libcamera/request.h>
+#include <lowlux/lowlux_stage.h>
 #include <sys/mman.h>
 
 #include <algorithm>
@@ -19,8 +21,6 @@
 #include <memory>
 #include <mutex>
 #include <vector>
-
-#include "isp/adapter/lowlux_stage.h"
 
 namespace {
 

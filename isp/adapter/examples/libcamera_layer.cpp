@@ -7,8 +7,9 @@
 // of LIBCAMERA_LAYER_PATH, loads those named in LIBCAMERA_LAYERS_ENABLE, and calls them for each camera between its
 // pipeline and the application.
 //
-//   g++ -std=c++20 -O2 -fPIC -shared libcamera_layer.cpp -o lowlux_layer.so $(pkg-config --cflags --libs libcamera
-//   lowlux_stage) LIBCAMERA_LAYER_PATH=$PWD LIBCAMERA_LAYERS_ENABLE=lowlux cam -c1 -C10 -srole=raw -Fframe#.raw
+//   flags=$(pkg-config --cflags --libs libcamera lowlux_stage)
+//   g++ -std=c++20 -O2 -fPIC -shared libcamera_layer.cpp -o lowlux_layer.so $flags
+//   LIBCAMERA_LAYER_PATH=$PWD LIBCAMERA_LAYERS_ENABLE=lowlux cam -c1 -C10 -srole=raw -Fframe#.raw
 //
 // LOWLUX_LAYER_PROFILE names a camera profile of `lowlux calibrate`; LOWLUX_LAYER_LEVEL is draft, standard (default) or
 // high. Frames whose noise is neither in the profile nor measurable stay as they are, and so do streams that are not
@@ -20,6 +21,7 @@
 #include <libcamera/request.h>
 #include <libcamera/stream.h>
 #include <linux/dma-buf.h>
+#include <lowlux/lowlux_stage.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
@@ -37,8 +39,6 @@
 #include <string>
 #include <utility>
 #include <vector>
-
-#include "isp/adapter/lowlux_stage.h"
 
 namespace {
 

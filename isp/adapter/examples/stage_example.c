@@ -1,21 +1,17 @@
 /* Processes one raw frame with lowlux's stage, from C99, with the library loaded by name.
  *
- *   stage_example LIBRARY PICTURE.ppm        e.g. stage_example liblowlux_stage.so.0 night.ppm
+ *   cc -std=c99 stage_example.c -o stage_example $(pkg-config --cflags lowlux_stage) -ldl -lm
+ *   ./stage_example LIBRARY PICTURE.ppm      e.g. ./stage_example liblowlux_stage.so.0 night.ppm
  *
  * The frame is simulated: 10-bit words in the order RGGB, as a V4L2 driver delivers them (RG10), of a dim scene that
  * becomes brighter to the right, with a black level of 64, shot noise, and 2 DN of read noise. With a camera, `frame`
  * is the memory of a dequeued buffer, and `stride` the driver's bytesperline. */
 #include <dlfcn.h>
+#include <lowlux/lowlux_stage.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#if defined(LOWLUX_INSTALLED)
-#include <lowlux/lowlux_stage.h>
-#else
-#include "isp/adapter/lowlux_stage.h"
-#endif
 
 enum { WIDTH = 640, HEIGHT = 480 };
 
