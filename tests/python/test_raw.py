@@ -75,6 +75,8 @@ def test_compressed_files_hold_the_same_samples_in_fewer_bytes(cfa, tmp_path, rn
 def test_the_pattern_is_the_one_that_was_written(cfa, tmp_path, rng):
     raw = written(tmp_path / "p.dng", codes(rng), cfa=cfa)
     assert raw.cfa == cfa
+    assert written(tmp_path / "lower.dng", codes(rng), cfa=cfa.lower()).cfa == cfa
+    assert lowlux.simulate("chart", size=(64, 48), cfa=raw.cfa).frames[0].cfa == cfa
     assert raw.raw_pattern.tolist() == PHASES[cfa]
     assert raw.color_desc == b"RGBG"
     assert raw.raw_colors[3, 5] == raw.raw_color(3, 5) == PHASES[cfa][1][1]

@@ -55,7 +55,7 @@ def raw_from_array(mosaic, *, black=None, white=None, cfa=None, noise=None, matr
         floats of any width, strides and byte order. Floats are held in 32 bits, and may lie below black and above white.
     black, white: levels in the units of the samples [DN]: one value; black also one for each site of the 2x2 cell, row
         by row; for RGB also three. The white level is an integer: scale floats to white=1.
-    cfa: "RGGB" (default), "GRBG", "GBRG", "BGGR", or "MONO" for a sensor without filters.
+    cfa: "RGGB" (default), "GRBG", "GBRG", "BGGR", or "MONO" for a sensor without filters; in any case.
     noise: (scale, offset), or three such pairs for R, G and B: the variance of x, with x = 0 at black and 1 at white, is
         scale * x + offset (DNG NoiseProfile).
     matrix: 3 x 3, from XYZ to camera RGB (DNG ColorMatrix1); without it colours are those of the camera, with a warning.
@@ -67,7 +67,7 @@ def raw_from_array(mosaic, *, black=None, white=None, cfa=None, noise=None, matr
     if like is not None and not isinstance(like, RawImage):
         raise _errors.ArgumentError(f"like: a {type(like).__name__} is not a RawImage; read_raw reads one", "like")
     return _lowlux.from_array(_array(mosaic), _numbers("black", black), _numbers("white", white),
-                              b"" if cfa is None else bytes_of(cfa, "cfa"), _numbers("noise", noise),
+                              b"" if cfa is None else bytes_of(cfa, "cfa").upper(), _numbers("noise", noise),
                               _numbers("matrix", matrix), _number("exposure_s", exposure_s), _number("iso", iso), like)
 
 

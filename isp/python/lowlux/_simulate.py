@@ -55,6 +55,8 @@ def simulate(scene, output=None, *, overwrite=False, size=None, light=None, lumi
     if isinstance(size, (tuple, list, np.ndarray)):
         sides = size.ravel().tolist() if isinstance(size, np.ndarray) else size
         options["size"] = "x".join(str(side) for side in sides)
+    if isinstance(cfa, str):
+        options["cfa"] = cfa.lower()  # RawImage.cfa and raw_from_array have capitals
     path = output_of(output)
     if not path and (truth is not None or truth_electrons is not None):
         raise ArgumentError("truth: a file of the truth requires an output", "truth")
