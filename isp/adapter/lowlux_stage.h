@@ -146,8 +146,8 @@ typedef struct {
   int32_t threads;          /* 1..8, including the caller's; 0: 2 */
   uint64_t memory_limit;    /* bytes; 0: 1 GiB */
   const char* profile_file; /* JSON of `lowlux calibrate`; its hot pixels are positions in full frames; null: none */
-  int32_t most_denoise;     /* highest LOWLUX_STAGE_LEVEL_... that memory is allocated for; 0: no level */
-  int32_t temporal;         /* 1: average with previous frames, motion compensated; 0: do not */
+  int32_t most_denoise;     /* highest LOWLUX_STAGE_LEVEL_... that memory is allocated for; 0: no level. Bayer only */
+  int32_t temporal;         /* 1: average with previous frames, motion compensated; 0: do not. Bayer only */
   int32_t look;             /* LOWLUX_STAGE_LOOK_... */
   int32_t tone;             /* 1: the standard curve; 0: none, linear light in sRGB's encoding */
   double field_of_view_deg; /* field of view of the image's longer side; 0: 50 */

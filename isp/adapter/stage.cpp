@@ -173,9 +173,10 @@ Result<LiveSetup> Stage::setup_for(const lowlux_stage_input& in, const RawFormat
   setup.samples = kind == StageOutput::rgb48 ? SampleType::u16 : SampleType::u8;
   if (settings_.look == LOWLUX_STAGE_LOOK_EYE) setup.look.look = Look::eye;
   if (settings_.field_of_view_deg > 0) setup.look.field_of_view_deg = settings_.field_of_view_deg;
-  setup.levels = settings_.most_denoise != LOWLUX_STAGE_LEVEL_NONE;
+  const bool is_reducible = format.layout == SensorLayout::bayer;
+  setup.levels = is_reducible && settings_.most_denoise != LOWLUX_STAGE_LEVEL_NONE;
   setup.most = level_of(settings_.most_denoise);
-  setup.temporal = settings_.temporal == 1;
+  setup.temporal = is_reducible && settings_.temporal == 1;
   if (settings_.demosaic != LOWLUX_STAGE_DEMOSAIC_DEFAULT) {
     setup.max_demosaic = static_cast<DemosaicMethod>(settings_.demosaic - LOWLUX_STAGE_DEMOSAIC_MALVAR);
   }

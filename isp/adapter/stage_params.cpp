@@ -217,7 +217,8 @@ StageFacts facts_of(const lowlux_stage_params& params, const StageStream& stream
   const LiveDenoise asked = denoise_of(params, stream);
   out.live.denoise = limited(asked, most);
   out.temporal_asked = asked.temporal;
-  out.applied |= params.valid & (LOWLUX_STAGE_HAS_DENOISE | LOWLUX_STAGE_HAS_BUDGET);
+  out.applied |= params.valid & LOWLUX_STAGE_HAS_BUDGET;
+  if (stream.format.layout == SensorLayout::bayer) out.applied |= params.valid & LOWLUX_STAGE_HAS_DENOISE;
   if (has(params, LOWLUX_STAGE_HAS_EXPOSURE_VALUE)) {
     out.live.exposure_ev = params.exposure_ev;
     out.applied |= LOWLUX_STAGE_HAS_EXPOSURE_VALUE;

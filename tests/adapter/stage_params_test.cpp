@@ -286,7 +286,9 @@ TEST(StageParams, TheMatrixOfAFrameGivesTheLookOfTheEyeItsColours) {
 TEST(StageParams, OfMonochromeFramesHaveNoColour) {
   for (const RawFormatNames& names : raw_formats()) {
     if (names.format.layout != SensorLayout::monochrome || names.format.bits != 10) continue;
-    Rig rig(plain_settings(2), names, width, height, LOWLUX_STAGE_BGR888);
+    auto settings = plain_settings(2);
+    settings.temporal = 1;
+    Rig rig(settings, names, width, height, LOWLUX_STAGE_BGR888);
     auto params = usual();
     params.valid = LOWLUX_STAGE_HAS_ALL & ~LOWLUX_STAGE_HAS_SEQUENCE;
     ASSERT_EQ(rig.process(scene(names.format, width, height), params), LOWLUX_STAGE_OK) << rig.error();
@@ -296,12 +298,25 @@ TEST(StageParams, OfMonochromeFramesHaveNoColour) {
       ASSERT_EQ(rgb[i], rgb[i + 2]);
     }
     EXPECT_GT(rgb[3 * (width - 1)], rgb[0]) << "the bright side is bright";
-    EXPECT_EQ(rig.result.applied &
-                  (LOWLUX_STAGE_HAS_COLOUR_GAINS | LOWLUX_STAGE_HAS_COLOUR_MATRIX | LOWLUX_STAGE_HAS_SATURATION),
-              0U);
+    EXPECT_EQ(
+        rig.result.applied & (LOWLUX_STAGE_HAS_COLOUR_GAINS | LOWLUX_STAGE_HAS_COLOUR_MATRIX |
+                              LOWLUX_STAGE_HAS_SATURATION | LOWLUX_STAGE_HAS_DENOISE | LOWLUX_STAGE_HAS_TIMESTAMP),
+        0U);
     EXPECT_EQ(rig.result.level, LOWLUX_STAGE_LEVEL_NONE);
     EXPECT_EQ(rig.statistics.sum[0], rig.statistics.sum[2]);
   }
+}
+
+TEST(StageParams, OfNoiseReductionTakeNoMemoryForMonochromeFrames) {
+  const RawFormatNames& grey = *names_of({12, RawPacking::little16, SensorLayout::monochrome});
+  auto settings = plain_settings(2);
+  settings.most_denoise = LOWLUX_STAGE_LEVEL_HIGH;
+  settings.temporal = 1;
+  settings.memory_limit = std::uint64_t{40} << 20;
+  const Rig grey_rig(settings, grey, 1600, 1200, LOWLUX_STAGE_BGR888);
+  EXPECT_GE(grey_rig.configured, LOWLUX_STAGE_OK) << grey_rig.error();
+  const Rig bayer_rig(settings, names_of_bayer(12), 1600, 1200, LOWLUX_STAGE_BGR888);
+  EXPECT_EQ(bayer_rig.configured, LOWLUX_STAGE_TOO_LARGE);
 }
 
 TEST(StageParams, MaskedPixelsTellBlackUnlessItIsGiven) {
