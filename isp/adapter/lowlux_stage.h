@@ -192,7 +192,7 @@ typedef struct {
   float digital_gain;     /* already applied to the codes, 0.1..1e3; noise scales with it */
   float colour_gains[2];  /* R and B, relative to G = 1; 1e-3..1e3. Only ratios count: the smallest of the three is 1 */
   float colour_matrix[9]; /* rows; white-balanced camera RGB to linear sRGB; each within 1e3 */
-  float lux;              /* illuminance of the scene, 0..1e9; gives its luminance if there is no better source */
+  float lux;              /* illuminance of the scene, 0 (not known)..1e9, if nothing states the luminance better */
   float temperature_c;    /* temperature of the sensor, -100..200 */
   int32_t denoise;        /* LOWLUX_STAGE_DENOISE_...; libcamera's ZSL (4) counts as MINIMAL */
   uint32_t sequence;      /* a gap or a step back discards the previous frames */

@@ -48,7 +48,7 @@ constexpr std::array<Number, 14> numbers{{
     {"saturation", "Saturation", "Saturation of the colours; 0: grey, 1: unchanged", 0, 4, &Properties::saturation},
     {"exposure-ev", "Exposure of the image", "Gain of the image [EV]; below -10: automatic", -100, 20,
      &Properties::exposure_ev},
-    {"lux", "Illuminance", "Illuminance of the scene [lx], for the look of the eye; below 0: not known", -1, 1e6,
+    {"lux", "Illuminance", "Illuminance of the scene [lx], for the look of the eye; 0 or less: not known", -1, 1e6,
      &Properties::lux},
     {"f-number", "F-number", "F-number of the lens, for the look of the eye; below 0.1: not known", 0, 100,
      &Properties::f_number},
@@ -250,7 +250,7 @@ lowlux_stage_params Properties::params() const {
   out.exposure_ev = static_cast<float>(exposure_ev);
   state(exposure_ev >= -10, LOWLUX_STAGE_HAS_EXPOSURE_VALUE);
   out.lux = static_cast<float>(lux);
-  state(lux >= 0, LOWLUX_STAGE_HAS_LUX);
+  state(lux > 0, LOWLUX_STAGE_HAS_LUX);
   out.f_number = static_cast<float>(f_number);
   state(f_number >= 0.1, LOWLUX_STAGE_HAS_F_NUMBER);
   out.budget_ms = static_cast<float>(budget_ms);
