@@ -201,6 +201,20 @@ TEST_F(DenoisePixels, WhatXTransIsNotUsedForIsStated) {
   refused({"calibrate", "black", file("light.dng"), file("flat.dng"), "-o", file("a.json")}, "2 x 2 sites");
 }
 
+// Its noise, which cannot be measured either, would not help.
+TEST_F(DenoisePixels, LinearRawWithoutStatedNoiseIsNotMergedBecauseItIsDemosaiced) {
+  for (const char* name : {"night.dng", "second.dng"}) write(name, night(Kind::linear_raw).remove(51041));
+  for (const bool states_noise : {false, true}) {
+    std::vector<std::string> words{"merge", file("night.dng"), file("second.dng"), "-o", file("merged.dng")};
+    if (states_noise) words.insert(words.end(), {"--noise", "16,2"});
+    const auto result = lowlux(words);
+    EXPECT_EQ(result.exit_code, 1) << result.err;
+    EXPECT_NE(result.err.find("night.dng: the frame is already demosaiced"), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(std::filesystem::exists(file("merged.dng")));
+  }
+}
+
 TEST_F(DenoisePixels, LinearRawWithoutStatedNoiseIsDevelopedWithOneWarning) {
   write("night.dng", night(Kind::linear_raw).remove(51041));
   const auto warnings = [&](const std::vector<std::string>& options) {

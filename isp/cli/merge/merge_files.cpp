@@ -84,11 +84,13 @@ Result<MergeReport> merge_files(const RawBatch& batch, const std::vector<std::st
     Result<ReadyFrame> read = read_frame(batch, {file, output.output, output.overwrite}, alone, clock);
     if (!read) return tl::make_unexpected(with_file(read.error(), file));
     if (cost) read->options.effects->cost = cost;
-    if (is_reference || batch.args.noise) {
+    // Demosaiced frames are refused by merge_frames, whatever their noise.
+    const bool is_mosaic = read->frame.raw.layout != SensorLayout::linear_rgb;
+    if (is_mosaic && (is_reference || batch.args.noise)) {
       const auto found = find_noise(read->options, batch.args.noise, read->frame, alone);
       if (!found) return tl::make_unexpected(with_file(found.error(), file));
       if (is_reference) origin = *found;
-    } else {
+    } else if (is_mosaic) {
       isp::refer_noise_to_black(read->frame, read->options);
     }
     return isp::FrameToMerge{std::move(read->frame), std::move(read->options), file};
