@@ -27,6 +27,7 @@ namespace {
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 constexpr double dn_per_e = 4, black_dn = 1024, white_dn = 16383;
 constexpr int border_px = 48;  // more than any displacement: what other frames show too
+constexpr int area_px = 16;    // side of the areas whose means are judged
 
 /// Describes the light of a burst: mean signal and dark charge of a pixel of frame 0 [e-]; read noise is 2 e-.
 struct MergeLight {
@@ -163,14 +164,40 @@ DevelopOptions merge_develop_options() {
 struct MosaicError {
   double still = 0;
   double moved = missing;   // where objects were
-  double stated = missing;  // mean variance that the NoiseProfile states, where nothing moved
+  double stated = missing;  // mean variance that the frame states, where nothing moved
+  /// Variance that the frame states for the means of R, G and B over areas in which nothing moved, over their
+  /// mean squared error.
+  double stated_of_areas = missing;
 };
+
+/// Sums of errors and of stated variances of R, G and B over one area.
+struct AreaSums {
+  std::array<double, 3> error{}, stated{};
+  bool moved = false;
+};
+
+double stated_of_areas(const Plane<AreaSums>& areas) {
+  double stated = 0, squares = 0;
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    const AreaSums& area = areas.data()[i];
+    if (area.moved) continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      stated += area.stated[c];
+      squares += area.error[c] * area.error[c];
+    }
+  }
+  return squares > 0 ? stated / squares : missing;
+}
 
 MosaicError error_of(const RawFrame& frame, const SimulatedBurst& burst) {
   const double black = frame.raw.black_tag->pattern_dn[0], white = frame.raw.white_dn[1];
   const double white_e = (white_dn - black_dn) / dn_per_e - burst.dark_e;
   std::array<double, 2> sum{}, count{};
   double stated = 0;
+  const NoiseRatioView ratio = view_of(frame.noise_ratio.get());
+  const auto areas_along = [](int px) { return (std::max(px - 2 * border_px, 1) + area_px - 1) / area_px; };
+  Plane<AreaSums> areas(areas_along(frame.raw.dn.width()), areas_along(frame.raw.dn.height()));
+  std::fill_n(areas.data(), areas.size(), AreaSums{});
   for (int y = border_px; y < frame.raw.dn.height() - border_px; ++y) {
     for (int x = border_px; x < frame.raw.dn.width() - border_px; ++x) {
       const double value = (frame.raw.dn.at(x, y) - black) / (white - black) * white_e;
@@ -179,10 +206,16 @@ MosaicError error_of(const RawFrame& frame, const SimulatedBurst& burst) {
       sum[moved] += (value - truth) * (value - truth);
       count[moved] += 1;
       const auto c = static_cast<std::size_t>(colour_at(frame.raw.phase, x, y));
-      if (moved == 0) stated += (frame.noise->scale[c] * truth / white_e + frame.noise->offset[c]) * white_e * white_e;
+      const double variance = static_cast<double>(ratio.at(x, y)) *
+                              (frame.noise->scale[c] * truth / white_e + frame.noise->offset[c]) * white_e * white_e;
+      AreaSums& area = areas.at((x - border_px) / area_px, (y - border_px) / area_px);
+      area.error[c] += value - truth;
+      area.stated[c] += variance;
+      area.moved = area.moved || moved != 0;
+      if (moved == 0) stated += variance;
     }
   }
-  MosaicError out{.still = sum[0] / count[0], .stated = stated / count[0]};
+  MosaicError out{.still = sum[0] / count[0], .stated = stated / count[0], .stated_of_areas = stated_of_areas(areas)};
   if (count[1] > 0) out.moved = sum[1] / count[1];
   return out;
 }
@@ -217,7 +250,7 @@ class Rows {
     single_ = error_of(burst_.frames[0], burst_);
     const auto best = compared(burst_.frames[0], burst_, denoise::Level::best, executor_);
     if (!best) return tl::make_unexpected(best.error());
-    table.rows.push_back(row("one frame, developed with best", 1, single_, *best, missing, missing));
+    table.rows.push_back(row("one frame, developed with best", 1, single_, *best, missing));
     return {};
   }
 
@@ -233,14 +266,13 @@ class Rows {
     const auto picture = compared(merged->frame, burst_, std::nullopt, executor_);
     if (!picture) return tl::make_unexpected(picture.error());
     const double megapixels = 1e-6 * burst_.mosaic_e.width() * burst_.mosaic_e.height();
-    table.rows.push_back(row(level.name, level.frames, error, *picture, error.stated / error.still,
-                             1e3 * seconds / (megapixels * level.frames)));
+    table.rows.push_back(row(level.name, level.frames, error, *picture, 1e3 * seconds / (megapixels * level.frames)));
     return {};
   }
 
  private:
   std::vector<BenchCell> row(const char* level, int frames, const MosaicError& error, const PictureComparison& picture,
-                             double stated, double ms_per_mp) const {
+                             double ms_per_mp) const {
     const auto gain_db = [](double before, double after) { return 10 * std::log10(before / after); };
     return {scene_,
             light_.name,
@@ -250,7 +282,8 @@ class Rows {
             gain_db(single_.still, error.still),
             10 * std::log10(frames),
             gain_db(single_.moved, error.moved),
-            stated,
+            error.stated / error.still,
+            error.stated_of_areas,
             picture.psnr_db,
             picture.ciede2000.mean,
             ms_per_mp};
@@ -327,6 +360,7 @@ Result<BenchOutcome> run_merge_bench(const BenchOptions& options) {
                        "10 log10 N [dB]",
                        "gain where objects moved [dB]",
                        "stated variance / error",
+                       "stated variance / error of areas",
                        "PSNR developed [dB]",
                        "CIEDE2000",
                        "time [ms per MP and frame]"};
@@ -356,6 +390,9 @@ Result<BenchOutcome> run_merge_bench(const BenchOptions& options) {
       fmt::format("bursts of a camera with 2 e- of read noise; pictures behind a lens, reduced to half; hand-held: "
                   "shifts up to 40 px, rotation up to 1.5 degrees; {} px at the border are not judged",
                   border_px),
+      fmt::format("stated variance / error: of a pixel, where nothing moved; of the means of R, G and B over areas of "
+                  "{0} x {0} px, which is what noise reduction has to know",
+                  area_px),
       "gain: error of one raw frame over that of the merged one, against the truth of frame 0; developed: by the level "
       "that develop chooses, PSNR of sRGB codes and mean CIEDE2000 against the scene"};
   return out;
