@@ -44,7 +44,8 @@ TEST(MergeMoving, GainsNearlyAsMuchAsFramesAtRest) {
 }
 
 // Waves of 3.5 pixels with 0.7 of the noise of a frame, which noise reduction of a single frame removes. A mean over
-// drops of radius 1.5 px keeps sinc^2(1.5 / 3.5) = 0.52 of their contrast.
+// drops of radius 1.5 px keeps sinc^2(1.5 / 3.5) = 0.52 of their contrast, over drops of 1 px 0.76. The mean of 8
+// frames has a signal-to-noise ratio of 11.5, for which drops have 1.05 px.
 TEST(MergeMoving, DetailThatNoiseHidesInOneFrameKeepsItsContrast) {
   constexpr double amplitude_e = 3.5, turns_per_px = 1 / 3.5;
   const auto wave = [](double x, double y) {
@@ -71,8 +72,8 @@ TEST(MergeMoving, DetailThatNoiseHidesInOneFrameKeepsItsContrast) {
   EXPECT_NEAR(contrast(1), 1, 5 * of_one);
   const double of_8 = contrast(8), of_32 = contrast(32);
   std::printf("contrast kept of 8 and 32 frames: %.3f, %.3f\n", of_8, of_32);
-  EXPECT_GT(of_8, 0.73);
-  EXPECT_GT(of_32, 0.87);
+  EXPECT_GT(of_8, 0.81);
+  EXPECT_GT(of_32, 0.93);
 }
 
 /// Shades the corners of a frame to a share of its light, and states the gain that corrects it. Saturated pixels stay.
