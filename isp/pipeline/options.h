@@ -14,6 +14,7 @@
 #include "isp/pipeline/plan/look.h"
 #include "isp/raw/black_point.h"
 #include "isp/raw/kernel/demosaic.h"
+#include "isp/raw/measure/saturation_level.h"
 #include "isp/render/output_space.h"
 #include "isp/render/profile_tables.h"
 #include "isp/render/tone.h"
@@ -85,6 +86,9 @@ struct DevelopOptions {
   /// States the dark charge [e-] of each site that another frame of the same series shows: used where the frame itself
   /// would be examined for it. Estimates of single frames scatter, and one that changes makes frames differ.
   std::optional<PerSite<double>> series_dark_e;
+  /// Pixels are saturated from the level on that the frame shows, where that is below white, else at white.
+  bool find_saturation = true;
+  std::optional<SaturationLevel> series_saturation;  // set: used instead, as another frame of the same series shows it
   bool find_defects = true;                     // search for hot and dead pixels in addition to those the source lists
   std::shared_ptr<const DarkFrame> dark_frame;  // set: subtracted pixel by pixel instead of `black`
   DenoiseChoice denoise;

@@ -33,7 +33,8 @@ struct DevelopPlan {
   std::optional<Framing> framing;    // set: a part of the image is kept, or it is shrunk
   std::optional<double> sharpen_px;  // set: sharpened for this blur; requested, and the noise is known
   bool local_tone_by_noise = false;  // local tone was requested, and the noise that limits it is known
-  /// Fractions of white at which R, G and B saturate; measured where highlights are rebuilt.
+  /// Fractions of white at which R, G and B saturate: result of saturated_from; where highlights are rebuilt, also of
+  /// measure_saturation.
   std::array<double, 3> saturation{1, 1, 1};
   bool from_codes = false;  // result of renders_from_codes
   DarkCharge dark;

@@ -164,11 +164,11 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
 }
 
 // The first list applies to images alone, the second to images and videos; neither applies to raw files.
-constexpr std::array of_pictures{"--bits",         "--quality",     "--space",        "--half",
-                                 "--repair",       "--line-noise",  "--effects",      "--tolerance",
-                                 "--dimming",      "--noise-limit", "--coefficients", "--display-luminance",
-                                 "--gain-setting", "--chroma-bias", "--light",        "--adaptation-degree",
-                                 "--noise"};
+constexpr std::array of_pictures{"--bits",         "--quality",         "--space",        "--half",
+                                 "--repair",       "--line-noise",      "--effects",      "--tolerance",
+                                 "--dimming",      "--noise-limit",     "--coefficients", "--display-luminance",
+                                 "--gain-setting", "--chroma-bias",     "--light",        "--adaptation-degree",
+                                 "--noise",        "--saturation-level"};
 constexpr std::array of_pictures_and_films{"--exposure",      "--wb",      "--tone",   "--look", "--scene-luminance",
                                            "--field-of-view", "--profile", "--denoise"};
 

@@ -335,6 +335,10 @@ void add_camera(CLI::App& app, DevelopArgs& args) {
   add_choice<bool>(
       app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
       "search for hot and dead pixels, or repair only those the file lists (default: auto)");
+  add_choice<bool>(
+      app, "--saturation-level", {{"auto", true}, {"white", false}}, [&o](bool find) { o.find_saturation = find; },
+      "pixels are saturated at the white level (white), or below it where the frame shows that the sensor does (auto, "
+      "default)");
 }
 
 std::optional<std::string> wrong_profiles(const DevelopArgs& args) {

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/cli/shared/lines.h"
+#include "isp/cli/shared/saturation_report.h"
 
 namespace lowlux::cli {
 namespace {
@@ -88,6 +89,7 @@ std::string merge_text(const MergeReport& report) {
   if (!merged.bracket) frames += fmt::format("; noise of a mean of {:.2f}", merged.mean_count);
   out.add("frames", frames);
   if (origin) out.add("noise model", origin_text(*origin));
+  if (merged.saturation) out.add("saturation", saturation_text(*merged.saturation));
   if (merged.plan) out.add("budget", budget_text(*merged.plan));
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     const isp::FrameUse& use = merged.frames[i];
@@ -136,6 +138,7 @@ std::string merge_json(const MergeReport& report) {
   const NoiseProfile& noise = *merged.frame.noise;
   Json json{{"alignment", alignment_name(merged.alignment)},
             {"bracket", merged.bracket},
+            {"saturation", Json::parse(saturation_json(merged.saturation))},
             {"mean_count", merged.mean_count},
             {"stars", merged.stars},
             {"still_fraction", merged.still_fraction},

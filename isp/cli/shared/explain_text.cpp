@@ -6,6 +6,7 @@
 
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/report.h"
+#include "isp/cli/shared/saturation_report.h"
 #include "isp/pipeline/budget/cost_model.h"
 
 namespace lowlux::cli {
@@ -212,6 +213,7 @@ std::string explain_text(const DevelopOutcome& outcome) {
       "black [DN]",
       fmt::format("{:.2f} from {}{}", fmt::join(plan.levels.black.pedestal_dn, " "), name_of(plan.levels.black.source),
                   plan.levels.black.holds == BlackPoint::Holds::pedestal_and_dark ? ", includes dark signal" : ""));
+  if (plan.levels.saturation) out.add("saturation", saturation_text(*plan.levels.saturation));
   if (const DarkFrame* const dark = plan.levels.dark_frame.get()) {
     out.add(dark->is_bias ? "bias frame" : "dark frame", dark_frame_text(*dark));
   }

@@ -4,6 +4,7 @@
 
 #include "calib/profile/profile_use.h"
 #include "isp/cli/shared/report.h"
+#include "isp/cli/shared/saturation_report.h"
 #include "isp/model/colour/camera_colour.h"
 #include "isp/model/sensor/scene_luminance.h"
 #include "isp/raw/black_point.h"
@@ -242,6 +243,7 @@ std::string develop_json(const DevelopOutcome& outcome, const Defaults& defaults
             {"width", outcome.width},
             {"height", outcome.height},
             {"black", black_json(plan.levels.black)},
+            {"saturation", Json::parse(saturation_json(plan.levels.saturation))},
             {"dark_frame", dark_json(plan.levels.dark_frame.get())},
             {"flat_frame", flat_json(outcome.flat.get())},
             {"dark", dark_charge_json(plan)},

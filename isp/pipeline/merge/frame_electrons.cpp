@@ -48,6 +48,8 @@ DevelopOptions options_of_signal(const DevelopOptions& options, denoise::Level l
                      .black = options.black,
                      .estimate_dark = options.estimate_dark,
                      .series_dark_e = options.series_dark_e,
+                     .find_saturation = options.find_saturation,
+                     .series_saturation = options.series_saturation,
                      .find_defects = options.find_defects,
                      .dark_frame = options.dark_frame,
                      .denoise = options.denoise};
@@ -80,6 +82,7 @@ Result<FrameElectrons> frame_electrons(const RawFrame& frame, const DevelopOptio
                      .dark_is_estimated = plan->dark.state == DarkCharge::State::estimated,
                      .warnings = std::move(plan->warnings)};
   describe_noise(frame, *plan, out);
+  out.saturation = plan->levels.saturation;
   const std::vector<Pixel> defects = std::exchange(plan->levels.defects, {});
   if (charge.value.empty()) charge = raw_electrons(frame, plan->levels, executor);
   out.signal_e = subtract_dark(std::move(charge), plan->levels.black, executor).value;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,11 +20,12 @@ namespace lowlux::isp {
 struct FrameElectrons {
   Plane<float> signal_e;  // pedestal, dark charge, row and column noise subtracted; NaN at defects
   BayerPhase phase = BayerPhase::rggb;
-  PerSite<double> variance_e2{};         // without light: read noise, dark charge, quantisation
-  PerSite<double> dark_charge_e{};       // mean that was subtracted; 0 if unknown
-  bool dark_is_estimated = false;        // that mean was estimated from the frame itself
-  PerSite<double> common_variance_e2{};  // of the subtracted dark frame, which frames of one exposure share
-  std::array<double, 3> saturation_e{};  // signal from which on a site of R, G, B is saturated
+  PerSite<double> variance_e2{};              // without light: read noise, dark charge, quantisation
+  PerSite<double> dark_charge_e{};            // mean that was subtracted; 0 if unknown
+  bool dark_is_estimated = false;             // that mean was estimated from the frame itself
+  PerSite<double> common_variance_e2{};       // of the subtracted dark frame, which frames of one exposure share
+  std::array<double, 3> saturation_e{};       // signal from which on a site of R, G, B is saturated
+  std::optional<SaturationLevel> saturation;  // set where the sensor saturates below white
   PerSite<double> light_at_white_e{};
   Plane<float> gain;  // that corrects the shading of the lens at each pixel; empty: none is stated, or not wanted
   std::vector<std::string> warnings;

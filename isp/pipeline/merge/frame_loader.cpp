@@ -64,7 +64,14 @@ Result<std::optional<NoiseProfile>> noise_at_levels(const FrameToMerge& referenc
 }
 
 /// Returns the share of saturated sites, of some rows.
-double saturated_share(const RawDn& raw) {
+double saturated_share(const FrameToMerge& to) {
+  const RawDn& raw = to.frame.raw;
+  PerSite<double> limit_dn{};
+  for (int site = 0; site < 4; ++site) limit_dn[site] = saturated_fraction_of_white * white_at(raw, site);
+  if (const Result<BlackPoint> black = choose_black_point(to.frame, to.options)) {
+    const auto level = choose_saturation(to.frame, *black, to.options);
+    if (level) limit_dn.fill(level->from_dn());
+  }
   double saturated = 0, sites = 0;
   with_samples(raw, [&](const auto& samples) {
     const Rect& active = raw.active;
@@ -72,7 +79,7 @@ double saturated_share(const RawDn& raw) {
       if (y % counted_rows > 1) continue;
       const auto* const row = samples.row(active.y + y) + active.x;
       for (int x = 0; x < active.width; ++x) {
-        saturated += static_cast<double>(row[x]) >= saturated_fraction_of_white * white_at(raw, site_of(x, y)) ? 1 : 0;
+        saturated += static_cast<double>(row[x]) >= limit_dn[site_of(x, y)] ? 1 : 0;
       }
       sites += active.width;
     }
@@ -110,6 +117,7 @@ Result<FrameElectrons> FrameLoader::read_reference(int index) {
   if (!electrons) return tl::make_unexpected(at_frame(electrons.error(), frame->name));
   clock_.lap("black and noise");
   reference_ = *std::move(frame);
+  saturation_ = electrons->saturation;
   dark_.reset();
   if (electrons->dark_is_estimated) dark_ = SeriesDark{electrons->dark_charge_e, reference_.frame.raw.info, true};
   return electrons;
@@ -182,7 +190,7 @@ Result<int> FrameLoader::brightest(int count) {
     const RawDn& raw = read->frame.raw;
     if (!raw.info.exposure_s) return 0;
     const double light = *raw.info.exposure_s / std::pow(raw.info.f_number.value_or(1), 2);
-    if (light <= most_light || saturated_share(raw) > most_saturated) continue;
+    if (light <= most_light || saturated_share(*read) > most_saturated) continue;
     found = index;
     most_light = light;
   }
@@ -198,6 +206,7 @@ Result<FrameElectrons> FrameLoader::electrons_of(const FrameToMerge& read) {
     PerSite<double>& charge_e = options.series_dark_e.emplace(dark_->charge_e);
     for (double& charge : charge_e) charge *= ratio;
   }
+  if (!differ(reference_.frame.raw.info.iso, last_.iso)) options.series_saturation = saturation_;
   Result<FrameElectrons> out = frame_electrons(read.frame, options, executor_, with_gain_);
   if (out && out->dark_is_estimated && !dark_) dark_ = SeriesDark{out->dark_charge_e, last_, false};
   return out;

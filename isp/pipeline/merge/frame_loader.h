@@ -73,6 +73,7 @@ class FrameLoader {
     bool is_of_reference = false;
   };
   std::optional<SeriesDark> dark_;
+  std::optional<SaturationLevel> saturation_;  // that the reference shows, for all frames of its ISO
   std::vector<int> order_;
   std::size_t position_ = 0;
   std::future<Result<FrameToMerge>> next_;

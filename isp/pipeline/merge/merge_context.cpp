@@ -14,6 +14,7 @@ Result<void> MergeContext::begin() {
   if (!read) return tl::make_unexpected(read.error());
   reference = *std::move(read);
   out.warnings = reference.warnings;
+  out.saturation = reference.saturation;
   width = reference.signal_e.width();
   height = reference.signal_e.height();
   added = 0;

@@ -70,8 +70,9 @@ struct FrameUse {
 struct MergedRaw {
   RawFrame frame;  // the active area only, in 16-bit codes or floating-point samples
   MergeAlignment alignment = MergeAlignment::none;
-  double baseline_exposure_ev = 0;  // for DNG: white of a bracket over that of its reference
-  bool bracket = false;             // exposures differ: weighted by inverse variance, saturated sites left out
+  double baseline_exposure_ev = 0;            // for DNG: white of a bracket over that of its reference
+  std::optional<SaturationLevel> saturation;  // set where the reference shows that the sensor saturates below white
+  bool bracket = false;  // exposures differ: weighted by inverse variance, saturated sites left out
   int reference = 0;
   std::optional<MergePlan> plan;  // set where there is a budget
   std::vector<FrameUse> frames;

@@ -26,6 +26,16 @@ bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool red
          frame.corrections.radial_gains.empty() && std::ranges::none_of(frame.corrections.gain_maps, has_effect);
 }
 
+std::array<double, 3> saturated_from(const RawDn& raw, const RawLevels& levels) {
+  if (!levels.saturation) return {1, 1, 1};
+  PerSite<double> fraction{};
+  for (int site = 0; site < 4; ++site) {
+    const double pedestal_dn = levels.black.pedestal_dn[site];
+    fraction[site] = (levels.saturation->from_dn() - pedestal_dn) / (white_at(raw, site) - pedestal_dn);
+  }
+  return by_colour(raw, fraction);
+}
+
 double black_variance_e2(const RawFrame& frame, const RawLevels& levels, int site, int colour, double electrons,
                          double e_per_dn) {
   const NoiseProfile& noise = *frame.noise;

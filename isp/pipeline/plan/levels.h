@@ -8,6 +8,7 @@
 #include "isp/base/dark_frame.h"
 #include "isp/base/frame.h"
 #include "isp/raw/black_point.h"
+#include "isp/raw/measure/saturation_level.h"
 #include "isp/raw/repair.h"
 
 namespace lowlux::isp {
@@ -18,12 +19,16 @@ struct RawLevels {
   PerSite<double> stated_dark_dn{};  // part of the pedestal of `black` that was stated as dark charge; 0 if unknown
   std::shared_ptr<const DarkFrame> dark_frame;        // set: subtracted pixel by pixel instead of the pedestal
   std::optional<PerSite<double>> electrons_at_white;  // set where the mosaic is converted to electrons
+  std::optional<SaturationLevel> saturation;          // set where the sensor saturates below white
   std::vector<Pixel> defects;                         // ascending
 };
 
 /// Returns whether a frame can be rendered directly from its 16-bit codes: it has codes, and no step before that
 /// repairs, multiplies, reduces noise, or subtracts pixel by pixel.
 bool renders_from_codes(const RawFrame& frame, const RawLevels& levels, bool reduces_noise);
+
+/// Returns the fractions of white from which on R, G and B are saturated by `levels.saturation`; 1 without.
+std::array<double, 3> saturated_from(const RawDn& raw, const RawLevels& levels);
 
 /// Returns the variance of a raw value without light [e-^2]: that of the noise model or, if that is more, that of the
 /// pixels which the black point was measured on, as a model may lack the noise of dark charge. A model that was

@@ -79,6 +79,7 @@ Result<RawLevels> choose_levels(const RawFrame& frame, const DevelopOptions& opt
   const bool holds_dark = out.black.holds == BlackPoint::Holds::pedestal_and_dark;
   if (holds_dark && !is_measured) out.stated_dark_dn = options.black.dark_dn;
   if (frame.noise) out.electrons_at_white = electrons_at_white(frame.raw, *frame.noise);
+  out.saturation = choose_saturation(frame, out.black, options);
   return out;
 }
 
@@ -99,6 +100,12 @@ Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackReques
 
 Result<BlackPoint> choose_black_point(const RawFrame& frame, const DevelopOptions& options) {
   return options.dark_frame ? black_of(frame.raw, *options.dark_frame) : choose_black_by_gain(frame, options.black);
+}
+
+std::optional<SaturationLevel> choose_saturation(const RawFrame& frame, const BlackPoint& black,
+                                                 const DevelopOptions& options) {
+  if (!options.find_saturation || options.series_saturation) return options.series_saturation;
+  return measure_saturation_below_white(frame.raw, black, frame.noise);
 }
 
 void refer_noise_to_black(RawFrame& frame, const DevelopOptions& options) {
@@ -164,6 +171,8 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   Result<Rendering> rendering = decide_rendering(frame, light, options, *picked);
   if (!rendering) return tl::make_unexpected(std::move(rendering.error()));
   append(plan.warnings, rendering->warnings);
+  plan.saturation = saturated_from(frame.raw, *levels);
+  rendering->transform.clip = clip_of(*rendering, plan.saturation);
   if (plan.dark.mean_e) {
     plan.dark.alpha = signal_fraction_at_median(frame, *levels, *rendering, light, plan.dark.charge_e);
   }
@@ -188,7 +197,9 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   if (rendering->look && rendering->look->noise_limit && !rendering->look->noise && !noise->has_level()) {
     plan.warnings.emplace_back("the noise of the frame is not known, so --noise-limit has no effect");
   }
-  if (options.highlights == Highlights::reconstruct) plan.saturation = measure_saturation(frame.raw, levels->black);
+  if (options.highlights == Highlights::reconstruct && !levels->saturation) {
+    plan.saturation = measure_saturation(frame.raw, levels->black);
+  }
   const bool knows_noise = noise->has_level() || frame.noise;
   if (knows_noise) plan.sharpen_px = options.sharpen_px;
   plan.local_tone_by_noise = knows_noise && options.local_tone > 0;

@@ -16,6 +16,11 @@ Result<BlackPoint> choose_black_by_gain(const RawFrame& frame, const BlackReques
 /// those of choose_black and black_of.
 Result<BlackPoint> choose_black_point(const RawFrame& frame, const DevelopOptions& options);
 
+/// Returns the level below white at which the sensor saturates, as the options request it: that of the series, else as
+/// the frame shows it; nullopt where there is none, and pixels saturate at white.
+std::optional<SaturationLevel> choose_saturation(const RawFrame& frame, const BlackPoint& black,
+                                                 const DevelopOptions& options);
+
 /// Refers the NoiseProfile of a file, which is stated above its tagged black level (DNG 1.7, NoiseProfile), to the
 /// black point as the options request it: a raw value x of 0..1 stands for another charge if that holds dark charge. To
 /// be called once for a frame that was read. Does nothing for other sources of noise, and where a black level is

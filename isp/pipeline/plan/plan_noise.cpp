@@ -43,9 +43,11 @@ denoise::RawNoise noise_of(const RawFrame& frame, const RawLevels& levels) {
   out.variance_e2 = black_variance_e2(frame, levels);
   // White levels of a thousandth of a code give larger variances.
   for (double& variance : out.variance_e2) variance = std::min(variance, denoise::largest_e);
+  const std::array<double, 3> saturated = saturated_from(frame.raw, levels);
   for (int site = 0; site < 4; ++site) {
-    double& saturation_e = out.saturation_e[colour_of(frame.raw, site)];
-    saturation_e = std::min(saturation_e, saturated_fraction_of_white * (*levels.electrons_at_white)[site]);
+    const int colour = colour_of(frame.raw, site);
+    const double fraction = std::min(saturated_fraction_of_white, saturated[colour]);
+    out.saturation_e[colour] = std::min(out.saturation_e[colour], fraction * (*levels.electrons_at_white)[site]);
   }
   return out;
 }

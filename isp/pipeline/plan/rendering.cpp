@@ -231,6 +231,13 @@ RgbTransform transform_of(const Matrix3& balanced, const Rendering& rendering, c
   return out;
 }
 
+float clip_of(const Rendering& rendering, const std::array<double, 3>& saturation) {
+  float out = rendering.transform.clip;
+  if (!std::isfinite(out)) return out;
+  for (std::size_t c = 0; c < 3; ++c) out = std::min(out, rendering.white_gain[c] * static_cast<float>(saturation[c]));
+  return out;
+}
+
 ToneTable tone_of(double limit, const DevelopOptions& options) {
   if (options.samples == SampleType::f32) return {};
   return make_tone_table(options.tone, options.space, limit, options.tone_shape);

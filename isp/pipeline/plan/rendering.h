@@ -81,6 +81,9 @@ AutoExposureOptions exposure_options(const FrameInfo& info, const Thumbnail& lig
 /// reconstructed.
 RgbTransform transform_of(const Matrix3& balanced, const Rendering& rendering, const DevelopOptions& options);
 
+/// Returns the clip of a rendering whose colours saturate at these fractions of white: where the first is saturated.
+float clip_of(const Rendering& rendering, const std::array<double, 3>& saturation);
+
 /// Returns the tone table for a limit; an empty one for float samples, which have no tone curve.
 ToneTable tone_of(double limit, const DevelopOptions& options);
 

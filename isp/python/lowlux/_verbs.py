@@ -87,7 +87,7 @@ def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, expos
             dark_estimate=None, repair=None, denoise=None, line_noise=None, chroma_bias=None, dark_frame=None,
             bias_frame=None, dark_frame_count=None, dark_noise=None, dark_doubling=None, flat_frame=None,
             budget_ms=None, budget_mpps=None, align=None, foreground=None, drizzle=None, pixfrac=None, mean=None,
-            reference=None, false_alarm=None, maps=False):
+            reference=None, false_alarm=None, saturation_level=None, maps=False):
     """Develop a raw frame to an image, as `lowlux develop` does with the same options.
 
     raw: a path or a RawImage, which is not changed; or a list of them, frames of one scene that are merged first.
@@ -118,7 +118,8 @@ def develop(raw, output=None, *, overwrite=False, bits=None, quality=None, expos
 
 def denoise(raw, output=None, *, overwrite=False, compression=None, black=None, profile=None, gain_setting=None,
             noise=None, dark_estimate=None, repair=None, denoise=None, line_noise=None, chroma_bias=None,
-            dark_frame=None, bias_frame=None, dark_frame_count=None, dark_noise=None, dark_doubling=None, maps=False):
+            dark_frame=None, bias_frame=None, dark_frame_count=None, dark_noise=None, dark_doubling=None,
+            saturation_level=None, maps=False):
     """Subtract noise, dark charge and defects from a raw frame, as `lowlux denoise` does with the same options.
 
     raw: a path or a RawImage, which is not changed.
@@ -137,7 +138,8 @@ def denoise(raw, output=None, *, overwrite=False, compression=None, black=None, 
 def merge(raws, output=None, *, overwrite=False, compression=None, align=None, foreground=None, drizzle=None,
           pixfrac=None, mean=None, reference=None, false_alarm=None, black=None, profile=None, gain_setting=None,
           noise=None, dark_estimate=None, repair=None, line_noise=None, dark_frame=None, bias_frame=None,
-          dark_frame_count=None, dark_noise=None, dark_doubling=None, flat_frame=None, budget_ms=None):
+          dark_frame_count=None, dark_noise=None, dark_doubling=None, flat_frame=None, saturation_level=None,
+          budget_ms=None):
     """Merge frames of one scene to one with less noise, as `lowlux merge` does with the same options.
 
     raws: paths or RawImages, which are not changed.
