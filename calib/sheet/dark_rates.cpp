@@ -225,13 +225,18 @@ std::optional<Estimate> doubling_of(std::span<const DarkRate> rates) {
   return Estimate{1 / slope.value, slope.standard_error / (slope.value * slope.value)};
 }
 
-std::optional<DarkLaw> law_of(std::span<const DarkRate> rates) {
+std::optional<DarkLaw> law_of(std::span<const DarkRate> rates, const Estimate& gain) {
   std::vector<RateAtTemperature> points;
   for (const DarkRate& rate : rates) {
     if (!rate.temperature_c) return std::nullopt;
     points.push_back({*rate.temperature_c, rate.by_mean_e_per_s});
   }
-  return fit_dark_law(points);
+  auto law = fit_dark_law(points);
+  if (law) {
+    Estimate& floor = law->floor_e_per_s;
+    floor.standard_error = std::hypot(floor.standard_error, floor.value * gain.standard_error / gain.value);
+  }
+  return law;
 }
 
 }  // namespace
@@ -267,6 +272,8 @@ Result<DarkRates> dark_rates(std::span<const DarkGroup> groups, const Estimate& 
   std::ranges::stable_sort(
       left, [](const DarkGroup* a, const DarkGroup* b) { return a->setting.temperature_c < b->setting.temperature_c; });
   DarkRates out;
+  // The error of the gain scales the rates of all temperatures alike: it changes neither doubling nor energy.
+  std::vector<DarkRate> of_exact_gain;
   for (auto first = left.begin(); first != left.end();) {
     const auto last = std::find_if(first, left.end(), [&](const DarkGroup* g) {
       return !same_temperature((*first)->setting.temperature_c, g->setting.temperature_c);
@@ -274,16 +281,18 @@ Result<DarkRates> dark_rates(std::span<const DarkGroup> groups, const Estimate& 
     const std::span<const DarkGroup* const> these(first, last);
     const auto [least, most] =
         std::ranges::minmax_element(these, {}, [](const DarkGroup* g) { return *g->setting.exposure_s; });
-    if (*(*least)->setting.exposure_s < *(*most)->setting.exposure_s)
+    if (*(*least)->setting.exposure_s < *(*most)->setting.exposure_s) {
       out.rates.push_back(rate_of(these, gain_dn_per_e));
+      of_exact_gain.push_back(rate_of(these, {gain_dn_per_e.value, 0}));
+    }
     first = last;
   }
   if (out.rates.empty()) {
     return fail(ErrorCode::insufficient,
                 "no two exposure times of darks at one temperature: dark current is not known");
   }
-  out.doubling_c = doubling_of(out.rates);
-  out.law = law_of(out.rates);
+  out.doubling_c = doubling_of(of_exact_gain);
+  out.law = law_of(of_exact_gain, gain_dn_per_e);
   return out;
 }
 

@@ -270,6 +270,39 @@ TEST(DarkRates, DriftOfTheTemperatureChangesNoVariance) {
   expect_near("by mean", rates->rates[0].by_mean_e_per_s, current);
 }
 
+// A wrong gain scales the currents of all temperatures alike: energy and doubling do not depend on it.
+TEST(DarkRates, ErrorsOfTheLawAreItsScatterAlthoughTheGainHasAnErrorToo) {
+  constexpr int rounds = 200;
+  constexpr double gain_error = 0.01, activation_ev = 0.6;
+  std::mt19937_64 random(first_seed + 3);
+  std::normal_distribution<double> normal;
+  double squares = 0, mean_doubling_error = 0;
+  for (int round = 0; round < rounds; ++round) {
+    SensorModel sensor = warm_sensor(random);
+    sensor.dsnu = 0;
+    sensor.column_noise_e = 0;
+    sensor.dark_activation_ev = activation_ev;
+    const SensorBench bench{.sensor = sensor, .width = 64, .height = 64, .seed = random()};
+    std::vector<DarkGroup> groups;
+    std::uint32_t frame = 0;
+    for (const double celsius : {0.0, 10.0, 20.0, 30.0, 40.0}) {
+      for (const double time_s : {0.1, 10.0}) {
+        groups.push_back(stack_of(bench, {time_s, celsius}, frame));
+        frame += stack_frames;
+      }
+    }
+    const double gain = sensor.system_gain_dn_per_e * (1 + gain_error * normal(random));
+    const auto rates = dark_rates(groups, {gain, gain_error * gain});
+    ASSERT_TRUE(rates) << rates.error().message;
+    ASSERT_TRUE(rates->law && rates->doubling_c) << "round " << round << ", seed " << bench.seed;
+    const Estimate& energy = rates->law->activation_ev;
+    squares += std::pow((energy.value - activation_ev) / energy.standard_error, 2) / rounds;
+    mean_doubling_error += rates->doubling_c->standard_error / rates->doubling_c->value / rounds;
+  }
+  EXPECT_NEAR(squares, 1, 5 * std::sqrt(2.0 / rounds)) << "seed " << first_seed + 3;
+  EXPECT_LT(mean_doubling_error, gain_error / 10);  // frames of 30 e-/s determine it to 0.03 %
+}
+
 TEST(DataSheet, FiguresThatTheFramesDoNotDetermineAreAbsent) {
   std::mt19937_64 random(first_seed);
   SheetFrames frames = shoot({.sensor = drawn_sensor(random), .width = 128, .height = 128});
