@@ -37,6 +37,7 @@ struct DecodedHeader {
   float xyz_to_camera[3][3];   // all 0 where unknown
   float camera_to_srgb[3][3];  // of white-balanced camera RGB; all 0 where unknown, or known by xyz_to_camera
   std::uint32_t dng_version;
+  std::uint32_t is_guessed_by_size;  // 1: the file has no header that the decoder knows
   double pixel_aspect;
   float iso, exposure_s, f_number, focal_length_mm;  // 0 where unknown
   float sensor_temperature_c, camera_temperature_c;  // below -273 where unknown

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <span>
@@ -92,6 +93,19 @@ void set_unpacking(Data& data, const ReadLimits& limits) {
   } else {
     set(data.params, data.params.raw_processing_options);
   }
+}
+
+/// Returns whether the camera is that of any file of this size: LibRaw knows files without a header by a table of
+/// sizes, and does not report that it used it. Zeros, which have no header, are then recognised as the same camera.
+bool is_guessed_by_size(const libraw_data_t& data, std::size_t file_bytes, const ReadLimits& limits) {
+  if (data.idata.dng_version != 0) return false;
+  const std::unique_ptr<void, decltype(&std::free)> zeros(std::calloc(file_bytes, 1), &std::free);
+  if (!zeros) return false;
+  const auto other = std::make_unique<LibRaw>(LIBRAW_OPIONS_NO_DATAERR_CALLBACK);
+  set_unpacking(other->imgdata, limits);
+  return other->open_buffer(zeros.get(), file_bytes) == LIBRAW_SUCCESS &&
+         std::strcmp(other->imgdata.idata.make, data.idata.make) == 0 &&
+         std::strcmp(other->imgdata.idata.model, data.idata.model) == 0;
 }
 
 /// Returns a description of a property that lowlux does not develop; nullptr if there is none. Needs open, not unpack.
@@ -197,6 +211,7 @@ void decode_with_libraw(std::span<const std::byte> file, const ReadLimits& limit
   }
   fill_sizes(libraw->imgdata, h);
   fill_shot(libraw->imgdata, h);
+  h.is_guessed_by_size = is_guessed_by_size(libraw->imgdata, file.size(), limits) ? 1 : 0;
   if (const char* kind = unsupported_kind(*libraw)) {
     h.outcome = DecodeOutcome::unsupported;
     copy_text(h.reason, kind);

@@ -14,6 +14,7 @@
 #include "capture/dng/dng_levels.h"
 #include "capture/file/pass_on.h"
 #include "capture/x_trans/x_trans_frame.h"
+#include "isp/base/camera_profile.h"
 #include "isp/model/colour/colorimetry.h"
 
 namespace lowlux::capture {
@@ -206,6 +207,12 @@ Result<RawFrame> frame_of_decoder(DecodedRaw decoded, const XTransUse& x_trans_u
   if (auto filled = fill_levels(h, frame.raw, frame.warnings); !filled) return pass_on(filled);
   frame.raw.info = info_of(h);
   if (frame.raw.layout != SensorLayout::monochrome) frame.colour = colour_of(h);
+  if (h.is_guessed_by_size != 0) {
+    frame.warnings.push_back("the file has no known header: the camera " +
+                             camera_name(frame.raw.info.make, frame.raw.info.model) +
+                             " was guessed from the size of the file alone; if it is another, write the samples to a "
+                             "DNG that states their size, mosaic and levels");
+  }
   if (std::isfinite(h.pixel_aspect) && std::fabs(h.pixel_aspect - 1) > 1e-3) {
     frame.warnings.emplace_back("the pixels are not square: their aspect is not applied");
   }

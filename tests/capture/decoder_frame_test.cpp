@@ -3,8 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <limits>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "capture/file/dng_source.h"
 #include "isp/model/colour/colorimetry.h"
@@ -105,6 +110,10 @@ TEST(DecoderFrame, AHeaderlessDumpIsReadFromEndToEnd) {
   const auto frame = read_raw(dump, "dump.raw");
   ASSERT_TRUE(frame) << frame.error().message;
   EXPECT_EQ(frame->raw.info.model, "F-080C");
+  const auto is_guess = [](const std::string& w) {
+    return w.find("F-080C was guessed from the size of the file alone") != std::string::npos;
+  };
+  EXPECT_EQ(std::count_if(frame->warnings.begin(), frame->warnings.end(), is_guess), 1);
   EXPECT_EQ(frame->raw.active, (Rect{0, 0, 1024, 768}));
   EXPECT_EQ(frame->raw.phase, BayerPhase::rggb);
   EXPECT_EQ(frame->raw.white_dn[0], 255);
@@ -112,6 +121,21 @@ TEST(DecoderFrame, AHeaderlessDumpIsReadFromEndToEnd) {
   for (std::size_t i = 0; i < dump.size(); ++i) {
     ASSERT_EQ(frame->raw.dn.data()[i], std::to_integer<int>(dump[i])) << i;
   }
+}
+
+// The header of a Nokia raw: data offset, bytes, width and height from byte 300 on. The file has the size of the dump.
+TEST(DecoderFrame, AFileWithAHeaderIsNotAGuessAlthoughDumpsHaveItsSize) {
+  std::vector<std::byte> file(std::size_t{1024} * 768, std::byte{100});
+  std::memcpy(file.data(), "NOKIARAW", 8);
+  const std::uint32_t offset = 4096, bytes = 512 * 512;
+  const std::uint16_t size[2] = {512, 512};
+  std::memcpy(&file[300], &offset, 4);
+  std::memcpy(&file[304], &bytes, 4);
+  std::memcpy(&file[308], size, 4);
+  const auto frame = read_raw(file, "nokia.raw");
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_NE(frame->raw.info.model, "F-080C");
+  for (const std::string& warning : frame->warnings) EXPECT_EQ(warning.find("guessed"), std::string::npos) << warning;
 }
 
 TEST(DecoderFrame, TheNeutralIsTheInverseOfTheMultipliers) {
