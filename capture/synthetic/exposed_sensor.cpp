@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -37,6 +38,28 @@ Plane<float> with_mask(const Plane<float>& rate, int masked_columns) {
 /// Returns the mean code at which a pixel saturates, above black [DN]: the full well's, if that is less than the
 /// converter's.
 double range_dn(const SensorModel& s) { return s.system_gain_dn_per_e * isp::saturation_charge_e(s); }
+
+/// Returns the mean of floor(x) for a normal variable x, as the sum of the probabilities that it reaches each code.
+double mean_of_floor(double mean, double std) {
+  if (std > 1.5) return mean - 0.5;  // to 1e-19
+  if (!(std > 0)) return std::floor(mean);
+  const double first = std::floor(mean - 10 * std);
+  double out = first;
+  for (double code = first + 1; code <= mean + 10 * std; ++code) {
+    out += 0.5 * std::erfc((code - mean) / (std * std::numbers::sqrt2));
+  }
+  return out;
+}
+
+/// Returns the mean code of a pixel without charge [DN], clipping at 0 left out.
+double mean_black_dn(const SensorModel& s, isp::NoiseSourceSet kept) {
+  double variance_e2 = 0;
+  if (kept.has(Effect::read_noise)) variance_e2 += s.read_noise_e * s.read_noise_e;
+  if (kept.has(Effect::row_noise)) variance_e2 += s.row_noise_e * s.row_noise_e;
+  if (kept.has(Effect::column_noise)) variance_e2 += s.column_noise_e * s.column_noise_e;
+  const double to_nearest = s.quantisation == Quantisation::round ? 0.5 : 0;
+  return mean_of_floor(s.black_level_dn + to_nearest, s.system_gain_dn_per_e * std::sqrt(variance_e2));
+}
 
 /// Returns the plan of a file: the planner's, with the effects that cost no time: the converter, which makes files of
 /// one sensor alike, and the blur of the lens, which is computed once for all frames, and which the truth has too.
@@ -175,13 +198,16 @@ RawFrame ExposedSensor::frame(std::uint32_t index, const PhotonRows* photons, Ex
   return described(stored_codes(index, photons, executor));
 }
 
+isp::NoiseSourceSet ExposedSensor::described_effects() const {
+  return camera_.options.effects.tolerance ? isp::NoiseSourceSet::all()
+                                           : file_plan_.regions.front().kept;  // one set for all regions
+}
+
 /// Returns the variance of codes in 0..1 of the range above black (DNG NoiseProfile): K / range * x + (K^2 sigma^2 +
 /// 1/12) / range^2, for the simulated effects. Without the photons' Poisson distribution no line in x describes the
 /// noise: then nullopt.
 std::optional<NoiseProfile> ExposedSensor::noise_profile() const {
-  const isp::NoiseSourceSet kept = camera_.options.effects.tolerance
-                                       ? isp::NoiseSourceSet::all()
-                                       : file_plan_.regions.front().kept;  // one set for all regions
+  const isp::NoiseSourceSet kept = described_effects();
   if (camera_.options.sampling == PhotonSampling::published || !kept.has(Effect::photon_noise)) return std::nullopt;
   const SensorModel& s = camera_.sensor.model;
   const double range = range_dn(s), k = s.system_gain_dn_per_e;
@@ -209,7 +235,10 @@ RawFrame ExposedSensor::described(Plane<std::uint16_t> codes) const {
     out.raw.masked_is_stated = true;
   }
   const double scale = storage_.scale, offset = storage_.offset_dn;
-  out.raw.black_tag = BlackLevel{1, 1, 1, {scale * (s.black_level_dn + offset)}, {}, {}};
+  const double black_dn = file_plan_.regions.front().kept.has(Effect::quantisation)
+                              ? std::max(0.0, mean_black_dn(s, described_effects()))
+                              : s.black_level_dn;
+  out.raw.black_tag = BlackLevel{1, 1, 1, {scale * (black_dn + offset)}, {}, {}};
   out.raw.white_dn.fill(std::round(std::min(65535.0, scale * (s.black_level_dn + range_dn(s) + offset))));
   FrameInfo& info = out.raw.info;
   info.make = "lowlux";

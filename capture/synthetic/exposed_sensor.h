@@ -55,6 +55,8 @@ class ExposedSensor {
   double largest_mean_e(const isp::BlockLevel& block, isp::NoiseSourceSet kept) const;
   Result<void> check_means(const std::vector<isp::BlockLevel>& blocks) const;
   void choose_storage();
+  /// Returns the effects that the tags of a file describe.
+  isp::NoiseSourceSet described_effects() const;
   std::optional<NoiseProfile> noise_profile() const;
   SensorFrame sensor_frame(std::uint32_t index, const PhotonRows* photons) const;
   Plane<std::uint16_t> stored_codes(std::uint32_t index, const PhotonRows* photons, Executor& executor) const;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -236,6 +237,33 @@ TEST(SyntheticStorage, TheNeutralIsTheColourOfTheScenesWhite) {
     ASSERT_TRUE(frame.colour.as_shot_neutral);
     for (int k = 0; k < 3; ++k) EXPECT_NEAR((*frame.colour.as_shot_neutral)[k], rate[k] / largest, 1e-12);
     EXPECT_EQ(frame.colour.calibrations.size(), 2u);
+  }
+}
+
+// Noise of less than a code leaves a mean that depends on the place of the pedestal between codes.
+TEST(SyntheticStorage, TheStatedBlackLevelIsTheMeanOfFramesWithoutLight) {
+  constexpr std::uint64_t first_seed = 20261130;
+  std::mt19937_64 random(first_seed);
+  std::uniform_real_distribution<double> pedestal(40, 900), log_noise(std::log(0.02), std::log(5));
+  for (int round = 0; round < 40; ++round) {
+    isp::NamedSensor sensor = test::plain_sensor();
+    SensorModel& m = sensor.model;
+    m.quantisation = round % 2 == 0 ? Quantisation::floor : Quantisation::round;
+    m.black_level_dn = pedestal(random);
+    if (round % 4 >= 2) m.black_level_dn = std::round(m.black_level_dn);
+    m.read_noise_e = round < 4 ? 0 : std::exp(log_noise(random)) / m.system_gain_dn_per_e;
+    const auto seed = random();
+    SCOPED_TRACE(testing::Message() << "seed " << seed << ", pedestal " << m.black_level_dn << " DN, noise "
+                                    << m.read_noise_e * m.system_gain_dn_per_e << " DN, "
+                                    << (round % 2 == 0 ? "floor" : "round"));
+    SyntheticOptions options = with(NoiseSourceSet::all());
+    options.seed = seed;
+    InlineExecutor executor;
+    const RawFrame frame = made(*dark_scene(test::setup_of(256, 128, 1)), sensor, options).frame(0, executor);
+    const std::vector<double> codes(frame.raw.dn.data(), frame.raw.dn.data() + frame.raw.dn.size());
+    const test::SampleMoments found = test::moments_of(codes);
+    // One code in the frame is the least that a rare one can change.
+    EXPECT_NEAR(frame.raw.black_tag->at(0, 0), found.mean, 5 * std::max(found.mean_error, 1.0 / 32768));
   }
 }
 
