@@ -105,7 +105,8 @@ Result<BlackPoint> choose_black_point(const RawFrame& frame, const DevelopOption
 std::optional<SaturationLevel> choose_saturation(const RawFrame& frame, const BlackPoint& black,
                                                  const DevelopOptions& options) {
   if (!options.find_saturation || options.series_saturation) return options.series_saturation;
-  return measure_saturation_below_white(frame.raw, black, frame.noise);
+  const bool is_stated = frame.noise && frame.noise->source == NoiseProfile::Source::file;  // others may be guessed
+  return measure_saturation_below_white(frame.raw, black, is_stated ? frame.noise : std::nullopt);
 }
 
 void refer_noise_to_black(RawFrame& frame, const DevelopOptions& options) {

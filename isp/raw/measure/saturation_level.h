@@ -29,8 +29,8 @@ struct SaturationLevel {
 ///     another colour are clearly below it, and these others vary: their block means are as many as in 8 bins or more
 ///     of 1/64 of the range, if they were evenly distributed. Surfaces that are evenly lit do not vary in one colour
 ///     alone, and edges of surfaces do not keep one colour in all of a block;
-///   - where the noise is stated, a standard deviation of at most half of that of light at this level, which evenly lit
-///     surfaces have: in merged frames it can be as small as that of saturated pixels;
+///   - where the source states its noise, a standard deviation of at most half of that of light at this level, which
+///     evenly lit surfaces have: in merged frames it can be as small as that of saturated pixels;
 ///   - blocks below the peak that are not neutral: the median of red / green or of blue / green differs from 1 by more
 ///     than 3 %. Otherwise the colours of everything agree, and the other evidence says little.
 /// Of frames of more than 4 megapixels a part of the rows is examined.
