@@ -209,7 +209,6 @@ def develop(
     noise: Optional[_Numbers] = ...,
     dark_estimate: Optional[Literal["auto", "off"]] = ...,
     repair: Optional[Literal["auto", "off"]] = ...,
-    saturation_level: Optional[Literal["auto", "white"]] = ...,
     denoise: Optional[Literal["auto", "off", "draft", "standard", "high", "best"]] = ...,
     line_noise: Optional[Literal["auto", "off"]] = ...,
     chroma_bias: Optional[Literal["least-error", "none"]] = ...,
@@ -228,6 +227,7 @@ def develop(
     mean: Optional[Literal["robust", "plain"]] = ...,
     reference: Optional[_Raw] = ...,
     false_alarm: Optional[float] = ...,
+    saturation_level: Optional[Literal["auto", "white"]] = ...,
     maps: bool = ...,
 ) -> Developed: ...
 
@@ -243,7 +243,6 @@ def denoise(
     noise: Optional[_Numbers] = ...,
     dark_estimate: Optional[Literal["auto", "off"]] = ...,
     repair: Optional[Literal["auto", "off"]] = ...,
-    saturation_level: Optional[Literal["auto", "white"]] = ...,
     denoise: Optional[Literal["auto", "draft", "standard", "high", "best"]] = ...,
     line_noise: Optional[Literal["auto", "off"]] = ...,
     chroma_bias: Optional[Literal["least-error", "none"]] = ...,
@@ -252,6 +251,7 @@ def denoise(
     dark_frame_count: Optional[int] = ...,
     dark_noise: Optional[float] = ...,
     dark_doubling: Union[float, _Path, None] = ...,
+    saturation_level: Optional[Literal["auto", "white"]] = ...,
     maps: bool = ...,
 ) -> Denoised: ...
 
@@ -274,7 +274,6 @@ def merge(
     noise: Optional[_Numbers] = ...,
     dark_estimate: Optional[Literal["auto", "off"]] = ...,
     repair: Optional[Literal["auto", "off"]] = ...,
-    saturation_level: Optional[Literal["auto", "white"]] = ...,
     line_noise: Optional[Literal["auto", "off"]] = ...,
     dark_frame: Union[_Raw, Sequence[_Raw], None] = ...,
     bias_frame: Union[_Raw, Sequence[_Raw], None] = ...,
@@ -282,6 +281,7 @@ def merge(
     dark_noise: Optional[float] = ...,
     dark_doubling: Union[float, _Path, None] = ...,
     flat_frame: Union[_Raw, Sequence[_Raw], None] = ...,
+    saturation_level: Optional[Literal["auto", "white"]] = ...,
     budget_ms: Optional[float] = ...,
 ) -> Merged: ...
 
