@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/base/json_text.h"
 #include "isp/cli/shared/report.h"
 #include "isp/output/picture/image_writer.h"
 
@@ -59,7 +60,7 @@ Json json_of(const Machine& machine) {
 }
 
 /// Returns JSON text; names of systems and processors may hold any bytes, so that invalid UTF-8 is replaced.
-std::string dumped(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
+std::string dumped(const Json& json) { return json_text(json, 2); }
 
 Json json_of(const MeasuredStage& measured, const Machine& machine) {
   Json rows = Json::array();

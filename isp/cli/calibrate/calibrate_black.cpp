@@ -83,7 +83,7 @@ calib::Measured measured_on(const Darks& darks, const std::optional<double>& iso
   return measured_today(std::move(files));
 }
 
-Result<Darks> read_darks(const CalibrateBlackArgs& args) {
+Result<Darks> read_dark_series(const CalibrateBlackArgs& args) {
   calib::DarkSorter sorter;
   Darks out;
   Progress progress(static_cast<int>(args.common.frames.size()), !args.common.quiet);
@@ -230,7 +230,7 @@ Result<Calibration> calibrate_black(const CalibrateBlackArgs& args) {
   if (const auto good = check_outputs(args.common); !good) return tl::make_unexpected(good.error());
   auto profile = starting_profile(args.common);
   if (!profile) return tl::make_unexpected(profile.error());
-  const auto darks = read_darks(args);
+  const auto darks = read_dark_series(args);
   if (!darks) return tl::make_unexpected(darks.error());
   Calibration found;
   found.profile = std::move(*profile);

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/base/json_text.h"
 #include "isp/cli/calibrate/calibration.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/report.h"
@@ -191,7 +192,7 @@ std::string colour_json(const ColourOutcome& outcome, const std::string& profile
   out["matrices"] = matrices;
   if (outcome.chart) out["chart"] = chart_json(*outcome.chart);
   out["warnings"] = outcome.warnings;
-  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_text(out);
 }
 
 isp::Report colour_report(const ColourOutcome& outcome, const std::string& profile) {

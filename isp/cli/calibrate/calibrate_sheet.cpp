@@ -74,8 +74,8 @@ bool belongs(const DarkFile& dark, const calib::FrameSetting& setting) {
 
 /// Averages darks by exposure time and temperature, the shortest first; single ones are left out with a warning.
 /// @return the files of the first
-Result<std::vector<std::string>> read_darks(const CalibrateSheetArgs& args, Reader& reader, calib::SheetFrames& out,
-                                            Calibration& found) {
+Result<std::vector<std::string>> read_sheet_darks(const CalibrateSheetArgs& args, Reader& reader,
+                                                  calib::SheetFrames& out, Calibration& found) {
   calib::DarkLibrary library(max_dark_groups);
   std::vector<DarkFile> darks;
   for (const std::string& file : args.darks) {
@@ -175,7 +175,7 @@ Result<calib::DarkGroup> average(const std::vector<std::string>& files, Reader& 
 Result<calib::SheetFrames> read_sheet_frames(const CalibrateSheetArgs& args, Calibration& found) {
   Reader reader(args, found);
   calib::SheetFrames out{.steady_light = args.steady_light, .irradiance = args.irradiance};
-  const auto first = read_darks(args, reader, out, found);
+  const auto first = read_sheet_darks(args, reader, out, found);
   if (!first) return tl::make_unexpected(first.error());
   const auto darks = read_pairs(*first, nullptr, {}, reader, found);
   if (!darks) return tl::make_unexpected(darks.error());

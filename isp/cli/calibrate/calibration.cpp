@@ -16,6 +16,7 @@
 #include "calib/profile/profile_io.h"
 #include "capture/file/dng_source.h"
 #include "isp/base/camera_profile.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/machine.h"
@@ -30,7 +31,7 @@ namespace {
 /// Replaces invalid UTF-8: names of files hold any bytes, JSON holds UTF-8 only.
 std::string readable(const std::string& name) {
   using Json = nlohmann::ordered_json;
-  return Json::parse(Json(name).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+  return Json::parse(json_text(Json(name))).get<std::string>();
 }
 
 /// Returns the report with the results, the method and the frames.
@@ -144,7 +145,7 @@ int finish(const CalibrateArgs& args, const Calibration& found) {
     const nlohmann::ordered_json json{{"output", args.output},
                                       {"warnings", found.warnings},
                                       {"profile", nlohmann::ordered_json::parse(*calib::profile_text(found.profile))}};
-    print_out(fmt::format("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
+    print_out(fmt::format("{}\n", json_text(json, 2)));
   } else {
     print_out(fmt::format("{}", found.text));
   }

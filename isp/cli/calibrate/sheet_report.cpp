@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/sheet/pattern_plots.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/calibrate/noise_report.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/machine.h"
@@ -108,11 +109,10 @@ std::vector<Figure> figures_of(const calib::DataSheet& sheet) {
   return out;
 }
 
-std::string text_of(const Figure& figure) {
+std::string figure_text(const Figure& figure) {
   if (!figure.value) return "not determined by these frames";
   const Estimate shown{figure.shown * figure.value->value, figure.shown * figure.value->standard_error};
-  const std::string number =
-      shown.standard_error > 0 ? lowlux::cli::text_of(shown) : fmt::format("{:.3g}", shown.value);
+  const std::string number = shown.standard_error > 0 ? text_of(shown) : fmt::format("{:.3g}", shown.value);
   return figure.unit.empty() ? number : number + " " + figure.unit;
 }
 
@@ -161,7 +161,7 @@ isp::ReportSection sheet_section(const calib::DataSheet& sheet) {
                           "computed from flats minus the darks of their exposure time.",
                           method),
       .table = {{"figure", "value"}, {}}};
-  for (const Figure& figure : figures_of(sheet)) out.table.rows.push_back({figure.name, text_of(figure)});
+  for (const Figure& figure : figures_of(sheet)) out.table.rows.push_back({figure.name, figure_text(figure)});
   return out;
 }
 
@@ -216,7 +216,7 @@ std::string sheet_json(const calib::DataSheet& sheet, const calib::SheetFrames& 
     for (const isp::Series& series : plot.series) out["spectrograms_e"][plot.id][series.name] = series.y;
   }
   out["warnings"] = found.warnings;
-  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(out, 2) + "\n";
 }
 
 }  // namespace lowlux::cli

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/v4l2/v4l2_source.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/module.h"
@@ -55,7 +56,7 @@ int list_cameras(bool json) {
     const Json all{{"v4l2", listing_json(found.v4l2)},
                    {"libcamera", listing_json(found.libcamera)},
                    {"note", found.note.empty() ? Json(nullptr) : Json(found.note)}};
-    print_out(fmt::format("{}\n", all.dump(2, ' ', false, Json::error_handler_t::replace)));
+    print_out(fmt::format("{}\n", json_text(all, 2)));
     return exit_done;
   }
   print_listing("--v4l2", found.v4l2);

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/base/json_text.h"
 #include "isp/base/packed/raw_format.h"
 #include "isp/cli/shared/lines.h"
 
@@ -44,7 +45,7 @@ std::string step_text(const CaptureWork& work) {
 }
 
 /// Returns "; exposure 0.04 s, gain 8" for automatic exposure.
-std::string exposure_text(const std::optional<ExposureState>& exposure) {
+std::string exposure_state_text(const std::optional<ExposureState>& exposure) {
   if (!exposure) return "";
   const std::string gain = exposure->gain ? fmt::format(", gain {:.3g}", *exposure->gain) : "";
   return fmt::format("; exposure {:.4g} s{}", exposure->exposure_s, gain);
@@ -66,7 +67,7 @@ std::string progress_text(const CaptureState& state) {
                      rate ? fmt::format("{:.1f} frames/s, ", *rate) : std::string(), count.taken, count.lost,
                      count.damaged, ms_for_each(count.wait_s, count.taken),
                      ms_for_each(state.work.process_s, count.taken), ms_for_each(state.work.write_s, count.taken),
-                     step_text(state.work), exposure_text(state.exposure));
+                     step_text(state.work), exposure_state_text(state.exposure));
 }
 
 std::string capture_json(const CaptureState& state, const Error* error) {
@@ -99,7 +100,7 @@ std::string capture_json(const CaptureState& state, const Error* error) {
   if (exposure) json["auto_exposure"] = exposure_json(*exposure);
   json["files"] = work.files;
   json["warnings"] = work.warnings;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json_text(json, 2);
 }
 
 CaptureProgress::CaptureProgress(bool wanted) : wanted_(wanted && ::isatty(STDERR_FILENO) == 1) {}

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/base/json_text.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/report.h"
@@ -154,7 +155,7 @@ std::string compare_json(const CompareArgs& args, const CompareOutcome& outcome)
                   {"beyond_gamut_a", c.reference_beyond},
                   {"beyond_gamut_b", c.test_beyond},
                   {"warnings", outcome.warnings}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json_text(json, 2);
 }
 
 }  // namespace lowlux::cli

@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/base/json_text.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/codec/picture_file.h"
 
@@ -100,7 +101,7 @@ Result<ArrayFile> ArrayFile::create_safetensors(const std::string& path, std::sp
         {"dtype", format_of(arrays[i]).safetensors}, {"shape", arrays[i].shape}, {"data_offsets", {begins[i], end}}};
   }
   constexpr int before = 8;
-  std::string text = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  std::string text = json_text(json);
   fill(text, before, 8);
   for (std::size_t& begin : begins) begin += before + text.size();
   return create(path, little_endian(text.size(), before) + text, std::move(begins));

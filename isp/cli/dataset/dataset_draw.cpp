@@ -16,7 +16,7 @@
 namespace lowlux::cli {
 namespace {
 
-using Json = nlohmann::json;
+using SortedJson = nlohmann::json;
 
 template <class Number>
 Number first_bits(std::string_view sha256) {
@@ -36,14 +36,14 @@ double rounded(double value, double low, double high) {
 }
 
 /// Returns the value of a setting as an option takes it.
-std::string text_of(const std::string& json) {
-  const Json value = Json::parse(json);
+std::string option_text(const std::string& json) {
+  const SortedJson value = SortedJson::parse(json);
   return value.is_string() ? value.get<std::string>() : json;
 }
 
 /// Returns the value of an option: names of files are relative to the spec.
 std::string option_value(const DatasetSpec& spec, const Setting& setting, const std::string& value) {
-  const std::string text = text_of(value);
+  const std::string text = option_text(value);
   return setting.key == "light" && text.ends_with(".csv") ? path_in(spec, text) : text;
 }
 
@@ -90,8 +90,8 @@ std::string draw_value(const Distribution& distribution, SettingKind kind, std::
     return std::to_string(static_cast<std::int64_t>(std::clamp(step * std::floor(value / step), low, high)));
   }
   // The sum of two products does not overflow where high - low does.
-  return Json(rounded(uniform ? (1 - u) * low + u * high : low * std::exp(u * (std::log(high) - std::log(low))), low,
-                      high))
+  return SortedJson(rounded(uniform ? (1 - u) * low + u * high : low * std::exp(u * (std::log(high) - std::log(low))),
+                            low, high))
       .dump();
 }
 
@@ -120,7 +120,7 @@ Result<SimulateArgs> simulate_args(const DatasetSpec& spec, const DatasetDraw& d
   for (const auto& [key, value] : draw.settings) {
     const auto setting = std::ranges::find(settings(), std::string_view(key), &Setting::key);
     const std::string flag = setting == settings().end() ? "--" + key : std::string(setting->flag);
-    const std::string text = setting == settings().end() ? text_of(value) : option_value(spec, *setting, value);
+    const std::string text = setting == settings().end() ? option_text(value) : option_value(spec, *setting, value);
     words.push_back(fmt::format("{}={}", flag, text));
   }
   const ErrorText errors;

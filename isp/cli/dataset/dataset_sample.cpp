@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/file/file_bytes.h"
-#include "isp/base/json_depth.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/dataset/dataset_draw.h"
 #include "isp/cli/dataset/sample_arrays.h"
 #include "isp/cli/shared/machine.h"
@@ -36,12 +36,10 @@ Json file_json(const std::string& name, std::uint64_t bytes, const std::string& 
   return {{"name", name}, {"bytes", bytes}, {"sha256", sha256}};
 }
 
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
-
 /// Returns the sample that a text of parameters describes.
 DatasetSample sample_of(Json files, const std::string& name, std::string_view parameters) {
   files.push_back(file_json(name, parameters.size(), sha256_of(parameters)));
-  DatasetSample sample{text_of(files), 0};
+  DatasetSample sample{json_text(files), 0};
   for (const Json& file : files) sample.bytes += file["bytes"].get<std::uint64_t>();
   return sample;
 }
@@ -178,7 +176,7 @@ class SampleFiles {
   std::map<std::string, std::string> metadata() const {
     std::map<std::string, std::string> out;
     for (const auto& [key, value] : parameters_.items()) {
-      out[key] = value.is_string() ? value.get<std::string>() : text_of(value);
+      out[key] = value.is_string() ? value.get<std::string>() : json_text(value);
     }
     return out;
   }
@@ -192,7 +190,7 @@ class SampleFiles {
       files.push_back(file_json(fs::path(file).filename().string(), hash->bytes, hash->sha256));
     }
     parameters_["files"] = files;
-    const std::string text = parameters_.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+    const std::string text = json_text(parameters_, 1) + "\n";
     if (const auto done = isp::write_text(stem_ + ".json", text, isp::Overwrite::yes); !done) {
       return tl::make_unexpected(done.error());
     }

@@ -13,22 +13,20 @@
 
 #include "calib/profile/json_keys.h"
 #include "capture/file/file_bytes.h"
-#include "isp/base/json_depth.h"
+#include "isp/base/json_text.h"
 #include "isp/base/text.h"
 #include "isp/cli/shared/option_values.h"
 
 namespace lowlux::cli {
 namespace {
 
-using Json = nlohmann::json;
+using SortedJson = nlohmann::json;
 
 constexpr std::array<std::string_view, 8> own_keys{"seed",    "first_index", "count",           "scenes",
                                                    "sensors", "mask",        "truth_electrons", "format"};
 constexpr std::uint64_t max_end = std::uint64_t{1} << 63;
 
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
-
-tl::unexpected<Error> wrong(const std::string& key, const std::string& what) {
+tl::unexpected<Error> wrong_key(const std::string& key, const std::string& what) {
   return fail(ErrorCode::malformed, key + ": " + what);
 }
 
@@ -37,11 +35,11 @@ tl::unexpected<Error> unknown(const std::string& key, const std::string& place, 
   for (const Setting& setting : settings()) known.push_back(setting.key);
   if (!in_sensor) known.insert(known.end(), own_keys.begin(), own_keys.end());
   const auto near = near_matches(key, known);
-  return wrong(place + key, near.empty() ? "unknown key; docs/using.md lists them"
-                                         : fmt::format("unknown key; similar keys: {}", fmt::join(near, ", ")));
+  return wrong_key(place + key, near.empty() ? "unknown key; docs/using.md lists them"
+                                             : fmt::format("unknown key; similar keys: {}", fmt::join(near, ", ")));
 }
 
-bool is_value(const Json& value, SettingKind kind) {
+bool is_value(const SortedJson& value, SettingKind kind) {
   switch (kind) {
     case SettingKind::number:
       return value.is_number();
@@ -58,50 +56,51 @@ const char* kind_text(SettingKind kind) {
   return kind == SettingKind::number ? "a number" : kind == SettingKind::text ? "a text" : "a whole number";
 }
 
-Result<Distribution> range_of(const Json& range, const std::string& name, SettingKind kind, const std::string& key) {
+Result<Distribution> range_of(const SortedJson& range, const std::string& name, SettingKind kind,
+                              const std::string& key) {
   Distribution out{.kind = name == "uniform" ? Distribution::Kind::uniform : Distribution::Kind::log_uniform};
-  if (kind == SettingKind::text) return wrong(key, fmt::format("texts have no {} range: use choice", name));
+  if (kind == SettingKind::text) return wrong_key(key, fmt::format("texts have no {} range: use choice", name));
   if (!range.is_array() || range.size() != 2 || !is_value(range[0], kind) || !is_value(range[1], kind)) {
-    return wrong(key, fmt::format("{} is not [LOW, HIGH] with {} for each", name, kind_text(kind)));
+    return wrong_key(key, fmt::format("{} is not [LOW, HIGH] with {} for each", name, kind_text(kind)));
   }
   out.low = range[0].get<double>(), out.high = range[1].get<double>();
-  if (!std::isfinite(out.low) || !std::isfinite(out.high)) return wrong(key, "a limit of the range is not finite");
+  if (!std::isfinite(out.low) || !std::isfinite(out.high)) return wrong_key(key, "a limit of the range is not finite");
   if (out.low == out.high) {
-    return wrong(key, fmt::format("the range {} is empty: write the value in place of it", range.dump()));
+    return wrong_key(key, fmt::format("the range {} is empty: write the value in place of it", range.dump()));
   }
   if (out.low > out.high) {
-    return wrong(key, fmt::format("the range {} is reversed: write the lower limit first", range.dump()));
+    return wrong_key(key, fmt::format("the range {} is reversed: write the lower limit first", range.dump()));
   }
   if (out.kind == Distribution::Kind::log_uniform && !(out.low > 0)) {
-    return wrong(key, fmt::format("the range {} of log_uniform does not begin above 0", range.dump()));
+    return wrong_key(key, fmt::format("the range {} of log_uniform does not begin above 0", range.dump()));
   }
   constexpr double max_whole = 9007199254740992;  // 2^53
   if (kind != SettingKind::number && (out.low < -max_whole || out.high > max_whole)) {
-    return wrong(key, "a limit of the range exceeds 2^53");
+    return wrong_key(key, "a limit of the range exceeds 2^53");
   }
   if (kind == SettingKind::even && (std::fmod(out.low, 2) != 0 || std::fmod(out.high, 2) != 0)) {
-    return wrong(key, fmt::format("the limits of the range {} are not even", range.dump()));
+    return wrong_key(key, fmt::format("the limits of the range {} are not even", range.dump()));
   }
   return out;
 }
 
-Result<Distribution> distribution_of(const Json& value, SettingKind kind, const std::string& key) {
-  if (is_value(value, kind)) return Distribution{.choices = {text_of(value)}};
-  if (!value.is_object()) return wrong(key, fmt::format("is neither {} nor a distribution", kind_text(kind)));
-  if (value.size() != 1) return wrong(key, "a distribution is one of uniform, log_uniform and choice");
+Result<Distribution> distribution_of(const SortedJson& value, SettingKind kind, const std::string& key) {
+  if (is_value(value, kind)) return Distribution{.choices = {json_text(value)}};
+  if (!value.is_object()) return wrong_key(key, fmt::format("is neither {} nor a distribution", kind_text(kind)));
+  if (value.size() != 1) return wrong_key(key, "a distribution is one of uniform, log_uniform and choice");
   const std::string& name = value.begin().key();
-  const Json& inner = value.begin().value();
+  const SortedJson& inner = value.begin().value();
   if (name == "uniform" || name == "log_uniform") return range_of(inner, name, kind, key);
   if (name != "choice") {
-    return wrong(key, fmt::format("unknown distribution '{}': uniform, log_uniform and choice are known", name));
+    return wrong_key(key, fmt::format("unknown distribution '{}': uniform, log_uniform and choice are known", name));
   }
-  if (!inner.is_array() || inner.empty()) return wrong(key, "choice is not a list of at least one value");
-  for (const Json& item : inner) {
+  if (!inner.is_array() || inner.empty()) return wrong_key(key, "choice is not a list of at least one value");
+  for (const SortedJson& item : inner) {
     if (!is_value(item, kind))
-      return wrong(key, fmt::format("choice has {}, which is not {}", item.dump(), kind_text(kind)));
+      return wrong_key(key, fmt::format("choice has {}, which is not {}", item.dump(), kind_text(kind)));
   }
   Distribution out;
-  for (const Json& item : inner) out.choices.push_back(text_of(item));
+  for (const SortedJson& item : inner) out.choices.push_back(json_text(item));
   return out;
 }
 
@@ -112,7 +111,7 @@ const Setting* setting_of(std::string_view key) {
 }
 
 /// Adds a setting, in place of one of the same key.
-Result<void> put_setting(const std::string& key, const Json& value, const std::string& place,
+Result<void> put_setting(const std::string& key, const SortedJson& value, const std::string& place,
                          std::vector<DrawnSetting>& all) {
   const Setting* setting = setting_of(key);
   auto distribution = distribution_of(value, setting->kind, place + key);
@@ -123,10 +122,10 @@ Result<void> put_setting(const std::string& key, const Json& value, const std::s
   return {};
 }
 
-Result<DatasetSensor> sensor_of(const Json& entry, std::vector<DrawnSetting> common) {
+Result<DatasetSensor> sensor_of(const SortedJson& entry, std::vector<DrawnSetting> common) {
   if (entry.is_string()) return DatasetSensor{entry.get<std::string>(), std::move(common)};
   if (!entry.is_object() || !entry.contains("name") || !entry["name"].is_string()) {
-    return wrong("sensors", "an entry is neither a name nor an object with a name");
+    return wrong_key("sensors", "an entry is neither a name nor an object with a name");
   }
   DatasetSensor out{entry["name"].get<std::string>(), std::move(common)};
   const std::string place = "sensors: " + out.name + ": ";
@@ -139,52 +138,52 @@ Result<DatasetSensor> sensor_of(const Json& entry, std::vector<DrawnSetting> com
 }
 
 /// Parses JSON. Errors: another text; a key that an object has twice; more than max_json_depth levels.
-Result<Json> parse(const std::string& text) {
+Result<SortedJson> parse(const std::string& text) {
   if (nests_deeper(text, max_json_depth)) {
     return fail(ErrorCode::malformed, fmt::format("is nested in more than {} levels of brackets", max_json_depth));
   }
   if (const auto fault = calib::find_json_fault(text, {})) {
     if (fault->kind == calib::JsonFault::Kind::duplicate_key) {
-      return wrong(fault->keys.back(), "the key is given twice");
+      return wrong_key(fault->keys.back(), "the key is given twice");
     }
     const std::string& what = fault->reason;
     return fail(ErrorCode::malformed, "is not JSON: " + what.substr(std::min(what.find("] ") + 2, what.size())));
   }
-  Json json = Json::parse(text);
+  SortedJson json = SortedJson::parse(text);
   if (!json.is_object()) return fail(ErrorCode::malformed, "is not a JSON object");
   return json;
 }
 
-Result<std::uint64_t> whole_of(const Json& json, const char* key, std::uint64_t fallback, std::uint64_t most) {
+Result<std::uint64_t> whole_of(const SortedJson& json, const char* key, std::uint64_t fallback, std::uint64_t most) {
   if (!json.contains(key)) return fallback;
-  const Json& value = json[key];
+  const SortedJson& value = json[key];
   if (!value.is_number_unsigned() || value.get<std::uint64_t>() > most) {
-    return wrong(key, fmt::format("{} is not a whole number of 0 to {}", value.dump(), most));
+    return wrong_key(key, fmt::format("{} is not a whole number of 0 to {}", value.dump(), most));
   }
   return value.get<std::uint64_t>();
 }
 
-Result<bool> flag_of(const Json& json, const char* key, bool fallback) {
+Result<bool> flag_of(const SortedJson& json, const char* key, bool fallback) {
   if (!json.contains(key)) return fallback;
-  if (!json[key].is_boolean()) return wrong(key, "is neither true nor false");
+  if (!json[key].is_boolean()) return wrong_key(key, "is neither true nor false");
   return json[key].get<bool>();
 }
 
-Result<std::optional<SampleFormat>> format_of(const Json& json) {
+Result<std::optional<SampleFormat>> sample_format_of(const SortedJson& json) {
   if (!json.contains("format")) return std::nullopt;
   const Names<SampleFormat> names{
       {"dng", SampleFormat::dng}, {"npy", SampleFormat::npy}, {"safetensors", SampleFormat::safetensors}};
   const auto found = names.find(json["format"].is_string() ? json["format"].get<std::string>() : "");
-  if (found == names.end()) return wrong("format", fmt::format("is not one of {}", joined(names)));
+  if (found == names.end()) return wrong_key("format", fmt::format("is not one of {}", joined(names)));
   return found->second;
 }
 
-Result<void> set_own_keys(const Json& json, DatasetSpec& spec) {
+Result<void> set_own_keys(const SortedJson& json, DatasetSpec& spec) {
   for (const char* key : {"count", "scenes", "sensors"}) {
-    if (!json.contains(key)) return wrong(key, "the key is missing");
+    if (!json.contains(key)) return wrong_key(key, "the key is missing");
   }
   for (const char* key : {"scenes", "sensors"}) {
-    if (!json[key].is_array() || json[key].empty()) return wrong(key, "is not a list of at least one");
+    if (!json[key].is_array() || json[key].empty()) return wrong_key(key, "is not a list of at least one");
   }
   const auto seed = whole_of(json, "seed", 1, ~std::uint64_t{0});
   const auto first = whole_of(json, "first_index", 0, max_end - 1);
@@ -196,27 +195,27 @@ Result<void> set_own_keys(const Json& json, DatasetSpec& spec) {
   for (const auto* flag : {&mask, &electrons}) {
     if (!*flag) return tl::make_unexpected(flag->error());
   }
-  const auto format = format_of(json);
+  const auto format = sample_format_of(json);
   if (!format) return tl::make_unexpected(format.error());
-  if (*count == 0) return wrong("count", "must be at least 1");
-  if (*count > max_end - *first) return wrong("count", "first_index + count exceeds 2^63");
+  if (*count == 0) return wrong_key("count", "must be at least 1");
+  if (*count > max_end - *first) return wrong_key("count", "first_index + count exceeds 2^63");
   spec.first_index = *first, spec.count = *count, spec.mask = *mask, spec.truth_electrons = *electrons;
   spec.format = *format;
-  for (const Json& scene : json["scenes"]) {
-    if (!scene.is_string()) return wrong("scenes", fmt::format("{} is not a text", scene.dump()));
+  for (const SortedJson& scene : json["scenes"]) {
+    if (!scene.is_string()) return wrong_key("scenes", fmt::format("{} is not a text", scene.dump()));
     spec.scenes.push_back(scene.get<std::string>());
   }
   return {};
 }
 
-Result<void> set_sensors(const Json& json, DatasetSpec& spec) {
+Result<void> set_sensors(const SortedJson& json, DatasetSpec& spec) {
   std::vector<DrawnSetting> common;
   for (const auto& [key, value] : json.items()) {
     if (std::ranges::find(own_keys, key) != own_keys.end()) continue;
     if (setting_of(key) == nullptr) return unknown(key, "", false);
     if (auto put = put_setting(key, value, "", common); !put) return put;
   }
-  for (const Json& entry : json["sensors"]) {
+  for (const SortedJson& entry : json["sensors"]) {
     auto sensor = sensor_of(entry, common);
     if (!sensor) return tl::make_unexpected(sensor.error());
     spec.sensors.push_back(*std::move(sensor));
@@ -235,7 +234,7 @@ Result<void> set_inputs(DatasetSpec& spec) {
     for (const DrawnSetting& drawn : sensor.settings) {
       if (drawn.setting->key != "light") continue;
       for (const std::string& choice : drawn.distribution.choices) {
-        const Json light = Json::parse(choice);
+        const SortedJson light = SortedJson::parse(choice);
         if (light.is_string() && light.get<std::string>().ends_with(".csv")) named.emplace(light, "light");
       }
     }
@@ -325,14 +324,14 @@ Result<DatasetSpec> read_dataset_spec(const std::string& file) {
   if (!set) return tl::make_unexpected(located(set.error()));
   json->erase("first_index");
   json->erase("count");
-  Json inputs = Json::array();
+  SortedJson inputs = SortedJson::array();
   for (const DatasetInput& input : spec.inputs) {
     inputs.push_back({{"name", input.name}, {"bytes", input.hash.bytes}, {"sha256", input.hash.sha256}});
   }
-  spec.identity = text_of({{"spec", *json}, {"inputs", inputs}});
+  spec.identity = json_text(SortedJson{{"spec", *json}, {"inputs", inputs}});
   spec.sha256 = sha256_of(spec.identity);
   json->erase("format");
-  spec.draw_sha256 = sha256_of(text_of({{"spec", *std::move(json)}, {"inputs", std::move(inputs)}}));
+  spec.draw_sha256 = sha256_of(json_text(SortedJson{{"spec", *std::move(json)}, {"inputs", std::move(inputs)}}));
   return spec;
 }
 

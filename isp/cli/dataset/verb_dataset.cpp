@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/file/file_bytes.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/dataset/dataset_args.h"
 #include "isp/cli/dataset/dataset_check.h"
 #include "isp/cli/dataset/dataset_sample.h"
@@ -54,7 +55,7 @@ Result<void> claim_folder(const DatasetSpec& spec, const std::string& folder, bo
   const std::string file = (fs::path(folder) / "dataset.json").string();
   Json json = head_of(spec);
   json.update(Json::parse(spec.identity));
-  const std::string text = json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  const std::string text = json_text(json, 1) + "\n";
   const auto same = [&] {
     const auto old = capture::read_file_bytes(file, max_bytes);
     return old && std::string_view(reinterpret_cast<const char*>(old->data()), old->size()) == text;
@@ -263,10 +264,10 @@ std::string outcome_json(const DatasetSpec& spec, const DatasetArgs& args, const
     json["made"] = outcome.made;
     json["bytes"] = outcome.bytes;
   }
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json_text(json, 2);
 }
 
-void print_outcome(const DatasetSpec& spec, const DatasetArgs& args, const DatasetOutcome& outcome) {
+void print_dataset(const DatasetSpec& spec, const DatasetArgs& args, const DatasetOutcome& outcome) {
   if (args.json) return print_out(outcome_json(spec, args, outcome) + "\n");
   if (args.dry_run && outcome.cost)
     return print_out(prediction_text(outcome.samples, outcome.measured, *outcome.cost) + "\n");
@@ -290,7 +291,7 @@ int run_dataset(const std::vector<std::string>& words) {
   }
   const Result<DatasetOutcome> outcome = args.dry_run ? dry_run(*spec, args) : ShardRun(*spec, args).run();
   if (!outcome) return print_failure(with_file(outcome.error(), args.spec), object_if(args.json));
-  print_outcome(*spec, args, *outcome);
+  print_dataset(*spec, args, *outcome);
   return exit_done;
 }
 

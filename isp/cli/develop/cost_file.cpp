@@ -16,7 +16,7 @@
 
 #include "capture/file/file_bytes.h"
 #include "isp/base/executor.h"
-#include "isp/base/json_depth.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/progress.h"
@@ -103,7 +103,7 @@ std::string cost_text(const isp::CostModel& model) {
     }
     json["megapixels_and_seconds"][std::string(name_of(static_cast<isp::CostPart>(i)))] = std::move(points);
   }
-  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(json, 1) + "\n";
 }
 
 Result<isp::CostModel> parse_cost(std::string_view text) {

@@ -23,6 +23,7 @@
 
 #include "capture/decoder/decoder_name.h"
 #include "capture/decoder/decoder_process.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/capture/capture_list.h"
 #include "isp/cli/config/config_file.h"
 #include "isp/cli/develop/cost_file.h"
@@ -237,7 +238,7 @@ std::vector<InstalledPart> find_installation() {
           find_bench_pictures()};
 }
 
-const char* name_of(State state) {
+const char* state_name(State state) {
   switch (state) {
     case State::works:
       return "works";
@@ -253,7 +254,7 @@ void print_parts(const std::vector<InstalledPart>& parts) {
   Lines lines;
   for (const InstalledPart& part : parts) {
     lines.add(part.name,
-              part.state == State::works ? part.found : fmt::format("{}: {}", name_of(part.state), part.remedy));
+              part.state == State::works ? part.found : fmt::format("{}: {}", state_name(part.state), part.remedy));
   }
   print_out(fmt::format("lowlux {}\n{}", version_number(), lines.text()));
 }
@@ -262,11 +263,11 @@ void print_json(const std::vector<InstalledPart>& parts) {
   Json json{{"lowlux", version_number()}, {"parts", Json::array()}};
   for (const InstalledPart& part : parts) {
     json["parts"].push_back({{"name", part.name},
-                             {"state", name_of(part.state)},
+                             {"state", state_name(part.state)},
                              {"found", part.found.empty() ? Json(nullptr) : Json(part.found)},
                              {"remedy", part.remedy.empty() ? Json(nullptr) : Json(part.remedy)}});
   }
-  print_out(fmt::format("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace)));
+  print_out(fmt::format("{}\n", json_text(json, 2)));
 }
 
 }  // namespace

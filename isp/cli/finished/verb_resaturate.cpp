@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/base/executor.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/finished/picture_verb.h"
 #include "isp/cli/finished/resaturate_args.h"
 #include "isp/cli/shared/lines.h"
@@ -100,7 +101,7 @@ void print(const ResaturateArgs& args, const ResaturateOutcome& done) {
                                       {"share_dark", done.made.fraction_dark},
                                       {"share_saturated", done.made.fraction_saturated},
                                       {"warnings", done.warnings}};
-    print_out(fmt::format("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
+    print_out(fmt::format("{}\n", json_text(json, 2)));
   } else if (!args.quiet) {
     Lines lines;
     lines.add("black", fmt::format("X {:.5f}, Y {:.5f}, Z {:.5f} of white 1", b.x, b.y, b.z));

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/base/executor.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/finished/picture_verb.h"
 #include "isp/cli/finished/retarget_args.h"
 #include "isp/cli/shared/lines.h"
@@ -68,10 +69,10 @@ void print_json(const RetargetArgs& args, const RetargetOutcome& done) {
     json["coefficients"] = nullptr;
     json["units"] = nullptr;
   }
-  print_out(fmt::format("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)));
+  print_out(fmt::format("{}\n", json_text(json, 2)));
 }
 
-void print_outcome(const RetargetArgs& args, const RetargetOutcome& done) {
+void print_retargeted(const RetargetArgs& args, const RetargetOutcome& done) {
   const isp::RetargetOptions& o = args.options;
   Lines lines;
   lines.add("luminance",
@@ -99,7 +100,7 @@ int run_retarget(const std::vector<std::string>& words) {
       if (args.json) {
         print_json(args, done);
       } else if (!args.quiet) {
-        print_outcome(args, done);
+        print_retargeted(args, done);
       }
       return done.warnings;
     });

@@ -65,7 +65,7 @@ bool has_flag(const HelpEntry& entry, std::string_view flag) {
 }
 
 /// Returns the section of an option that is not in front.
-std::string title_of(const std::string& verb, const CLI::Option& option, const HelpEntry& entry) {
+std::string group_title(const std::string& verb, const CLI::Option& option, const HelpEntry& entry) {
   if (option.get_group() != default_group) return option.get_group();
   return std::string(option_group(verb, entry.flags.back()));
 }
@@ -98,7 +98,7 @@ HelpPage help_page(const CLI::App& app) {
     } else if (help.front.empty() && option->get_group() == default_group) {
       page.front.entries.push_back(std::move(entry));
     } else if (std::ranges::none_of(help.front, [&](std::string_view flag) { return has_flag(entry, flag); })) {
-      const std::string title = title_of(page.verb, *option, entry);
+      const std::string title = group_title(page.verb, *option, entry);
       append(page.rest, title.empty() ? "More" : title, std::move(entry));
     }
   }

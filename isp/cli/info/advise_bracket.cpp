@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isp/base/executor.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/report.h"
@@ -173,7 +174,7 @@ std::string bracket_json(const BracketCase& found, const FrameInfo& info) {
                   {"dark_charge_e", scene.dark_charge_e},
                   {"noise_variance_e2", scene.noise_variance_e2},
                   {"command", command_of(advice)}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json_text(json, 2);
 }
 
 }  // namespace lowlux::cli

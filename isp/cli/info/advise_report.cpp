@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/base/json_text.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/report.h"
@@ -198,7 +199,7 @@ std::string advice_json(const AdviceCase& asked, const isp::ExposureAdvice& advi
                   {"notes", asked.notes},
                   {"gains", gains},
                   {"curve", curve}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json_text(json, 2);
 }
 
 isp::Report advice_page(const AdviceCase& asked, const isp::ExposureAdvice& advice) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/base/json_text.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/saturation_report.h"
 
@@ -149,7 +150,7 @@ std::string merge_json(const MergeReport& report) {
             {"times", times}};
   if (origin) json["noise_model"] = Json::parse(origin_json(*origin));
   if (merged.plan) json["budget"] = budget_json(*merged.plan);
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json_text(json, 2);
 }
 
 }  // namespace lowlux::cli

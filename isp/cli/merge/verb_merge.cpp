@@ -24,7 +24,7 @@ struct Files {
   Job output;
 };
 
-Result<Files> files_of(const DevelopArgs& args) {
+Result<Files> input_files(const DevelopArgs& args) {
   Files out;
   out.output = {{}, args.output, args.force ? isp::Overwrite::yes : isp::Overwrite::no};
   if (!args.output.ends_with(".dng")) {
@@ -75,7 +75,7 @@ int run_merge(const std::vector<std::string>& words) {
   const Parsed<DevelopArgs> parsed = parse_merge(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<DevelopArgs>(parsed);
-  const Result<Files> files = files_of(args);
+  const Result<Files> files = input_files(args);
   if (!files) return print_argument_error("merge", files.error(), args.defaults, object_if(args.json));
   Result<RawBatch> batch = make_batch(args, args.options, {files->output}, files->calibration);
   if (!batch) return print_failure(batch.error(), object_if(args.json));

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/base/json_text.h"
+
 namespace lowlux::cli {
 namespace {
 
@@ -82,7 +84,7 @@ std::string origin_json(const NoiseOrigin& origin) {
   json["measured_over_expected"] = origin.prior_ratio;
   json["unmeasurable"] = origin.unmeasurable;
   json["doubts"] = origin.doubts;
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return json_text(json);
 }
 
 }  // namespace lowlux::cli

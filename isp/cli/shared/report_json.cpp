@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/profile/profile_use.h"
+#include "isp/base/json_text.h"
 #include "isp/cli/shared/report.h"
 #include "isp/cli/shared/saturation_report.h"
 #include "isp/model/colour/camera_colour.h"
@@ -16,7 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // Returns JSON text. Names are bytes on Linux: invalid UTF-8 is replaced, so that the output is valid JSON.
-std::string dumped(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
+std::string dumped(const Json& json) { return json_text(json, 2); }
 
 Json rect_json(const Rect& r) { return {{"x", r.x}, {"y", r.y}, {"width", r.width}, {"height", r.height}}; }
 

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/base/json_text.h"
 #include "isp/cli/shared/lines.h"
 #include "isp/cli/shared/report.h"
 #include "isp/model/spectrum/cie_data.h"
@@ -34,12 +35,12 @@ const char* reason_of(const isp::NoiseSourceDecision& decision, isp::NoiseSource
   return "above the tolerance, alone or together with effects that are left out";
 }
 
-std::string name_of(isp::Effect effect) { return std::string(isp::effect_names()[static_cast<int>(effect)]); }
+std::string effect_name(isp::Effect effect) { return std::string(isp::effect_names()[static_cast<int>(effect)]); }
 
 Json region_json(const isp::RegionPlan& region, isp::NoiseSourceSet wanted) {
   Json decisions = Json::array();
   for (const isp::NoiseSourceDecision& d : region.decisions) {
-    decisions.push_back({{"effect", name_of(d.effect)},
+    decisions.push_back({{"effect", effect_name(d.effect)},
                          {"kept", d.kept},
                          {"reason", reason_of(d, wanted)},
                          {"predicted_delta_e", d.alone.delta_e},
@@ -129,7 +130,7 @@ std::string explain_text(const SimulateArgs& args, const SimulateOutcome& outcom
                    glow);
     fmt::format_to(out, "  {:<15} {:>10} {:>12}  {:<9} {}\n", "effect", "delta E", "variance", "decision", "because");
     for (const isp::NoiseSourceDecision& d : region.decisions) {
-      fmt::format_to(out, "  {:<15} {:>10.3g} {:>12.3g}  {:<9} {}\n", name_of(d.effect), d.alone.delta_e,
+      fmt::format_to(out, "  {:<15} {:>10.3g} {:>12.3g}  {:<9} {}\n", effect_name(d.effect), d.alone.delta_e,
                      d.alone.relative_variance, d.kept ? "simulate" : "leave out",
                      reason_of(d, args.options.effects.effects));
     }
@@ -183,7 +184,7 @@ std::string simulate_json(const SimulateArgs& args, const SimulateOutcome& o) {
   if (o.saturation_cd_m2) json["saturation_luminance_cd_m2"] = *o.saturation_cd_m2;  // of D65
   if (o.cost) json["cost"] = cost_json(*o.cost);
   for (const isp::StageTime& time : o.times) json["times_s"][time.stage] = time.seconds;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json_text(json, 2);
 }
 
 std::string simulate_list() {
@@ -235,7 +236,7 @@ std::string burst_truth_json(const SimulateArgs& args, const capture::BurstSourc
   text += ",\n\"frames\": [\n";
   for (std::size_t i = 0; i < files.size(); ++i) {
     const capture::BurstTruth truth = source.truth(static_cast<std::uint32_t>(i));
-    text += frame_json(truth, files[i], centre).dump(-1, ' ', false, Json::error_handler_t::replace);
+    text += json_text(frame_json(truth, files[i], centre));
     text += i + 1 < files.size() ? ",\n" : "\n";
   }
   text += "],\n\"points_of_frame_0\": [\n";

@@ -16,7 +16,7 @@
 namespace lowlux::cli {
 namespace {
 
-void print_outcome(const SimulateArgs& args, const SimulateOutcome& outcome) {
+void print_simulated(const SimulateArgs& args, const SimulateOutcome& outcome) {
   if (!args.quiet) {
     for (const std::string& warning : outcome.warnings) {
       print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: {}: warning: {}", args.scene.what, warning))));
@@ -51,7 +51,7 @@ int run_simulate(const std::vector<std::string>& words) {
     const std::string place = error.where.empty() ? "" : " (" + error.where + ")";
     return print_usage_error("simulate", {error.code, error.message + place, {}});
   }
-  print_outcome(args, *outcome);
+  print_simulated(args, *outcome);
   return exit_done;
 }
 

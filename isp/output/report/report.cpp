@@ -11,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "isp/base/json_text.h"
 #include "isp/base/text.h"
 
 namespace lowlux::isp {
@@ -200,7 +201,7 @@ Json json_of(const Plot& plot) {
 // Returns JSON that is safe inside a script element: no "</script>" or "<!--" can appear in it.
 std::string script_text(const Json& json) {
   std::string out;
-  for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
+  for (const char c : json_text(json)) {
     if (c == '<') {
       out += "\\u003c";
     } else {

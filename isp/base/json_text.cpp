@@ -1,4 +1,4 @@
-#include "isp/base/json_depth.h"
+#include "isp/base/json_text.h"
 
 #include <cstddef>
 
