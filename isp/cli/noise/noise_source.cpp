@@ -121,6 +121,20 @@ calib::NoisePrior prior_of(const calib::NoiseFigures& figures, const RawDn& raw)
       .offset_log_std = std::max(2 * read_part * std::hypot(gain_log_std, std::log(figures.read_noise_factor)), 0.1)};
 }
 
+/// Returns by how much the logarithm of a gain may be off in addition to its prior, because the image contradicts the
+/// prior. The image determines one combination of gain and offset: its squared distance from the prior is 1 on average.
+double contradiction_of(const calib::NoisePrior& prior, const calib::PictureNoise& fitted) {
+  const double gain = std::log(fitted.gain_dn_per_e.value / prior.gain_dn_per_e) / prior.gain_log_std;
+  const double offset = std::log(fitted.offset_dn2.value / prior.offset_dn2) / prior.offset_log_std;
+  return prior.gain_log_std * std::sqrt(std::max(gain * gain + offset * offset - 1, 0.0));
+}
+
+/// Returns the uncertainty of a figure that an image states within `fitted`, and that was expected within `expected`.
+/// An image makes figures more certain, unless it contradicts them: then it is not known which of both is wrong.
+double adjusted_factor(double fitted, double expected, double contradiction) {
+  return std::exp(std::hypot(std::log(std::clamp(fitted, 1.0, expected)), contradiction));
+}
+
 /// Returns the relative standard error of the variance of pixels `mean_dn` above black.
 double variance_error(const calib::PictureNoise& noise, double mean_dn) {
   const double a = noise.gain_dn_per_e.standard_error * mean_dn, b = noise.offset_dn2.standard_error;
@@ -169,15 +183,17 @@ NoiseOrigin assume_noise(const BlackPoint& black, std::string unmeasurable, RawF
   out.unmeasurable = std::move(unmeasurable);
   double offset_dn2 = offset_dn2_of(*out.figures, raw);
   bool is_denoised = false;
-  if (const auto fitted = calib::fit_picture_noise(raw, black.pedestal_dn, prior_of(*out.figures, raw), {}, executor)) {
+  const calib::NoisePrior prior = prior_of(*out.figures, raw);
+  if (const auto fitted = calib::fit_picture_noise(raw, black.pedestal_dn, prior, {}, executor)) {
     const calib::NoiseFigures expected = std::exchange(*out.figures, figures_of(*fitted, true));
     out.prior_ratio = fitted->prior_ratio;
     is_denoised = fitted->prior_ratio < 1 && fitted->traces.denoised;
     out.doubts = fitted->reasons;
-    out.is_adjusted =
-        fitted->flat_fraction > 0 || out.prior_ratio < 1;  // an image makes figures more certain, never less
-    out.figures->gain_factor = std::min(out.figures->gain_factor, expected.gain_factor);
-    out.figures->read_noise_factor = std::clamp(out.figures->read_noise_factor, 1.0, expected.read_noise_factor);
+    out.is_adjusted = fitted->flat_fraction > 0 || out.prior_ratio < 1;
+    const double contradiction = contradiction_of(prior, *fitted);
+    const auto adjust = [&](double& factor, double before) { factor = adjusted_factor(factor, before, contradiction); };
+    adjust(out.figures->gain_factor, expected.gain_factor);
+    adjust(out.figures->read_noise_factor, expected.read_noise_factor);
     offset_dn2 = fitted->offset_dn2.value;
   }
   frame.noise = profile_of(out.figures->gain_dn_per_e, offset_dn2, raw, black, NoiseProfile::Source::picture);

@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include "calib/noise/sensor_class.h"
 #include "isp/model/sensor/sensor_db.h"
 #include "isp/raw/to_linear.h"
 #include "tests/support/frames.h"
@@ -120,19 +121,22 @@ TEST_F(NoiseSourceOrder, IsGivenThenProfileThenFileThenPictureThenWhatIsKnown) {
 TEST_F(NoiseSourceOrder, AssumedReadNoiseIsThatOfTheModelWithoutQuantisation) {
   for (const double read_noise_e : {1.5, 4.0, 12.0}) {
     for (const bool is_raspberry : {false, true}) {
+      FrameInfo info{.make = "Acme", .model = "Two", .iso = 100};
+      if (is_raspberry) info = {.make = "Raspberry Pi", .model = "/base/soc/i2c0mux/i2c@1/imx477@1a", .iso = 100};
+      RawDn described = frame_of(sensor_, 40, true, 1).raw;
+      described.info = info;
+      std::vector<std::string> ignored;
+      const NoiseOrigin known = known_noise(described, 12'000, ignored);
       SensorModel sensor = sensor_;
+      sensor.system_gain_dn_per_e = known.figures->gain_dn_per_e;  // the image does not contradict what is known
       sensor.read_noise_e = read_noise_e;
       RawFrame frame = frame_of(sensor, 40, true, 1);
-      frame.raw.info.iso = 100;
-      frame.raw.info.make = is_raspberry ? "Raspberry Pi" : "Acme";
-      frame.raw.info.model = is_raspberry ? "/base/soc/i2c0mux/i2c@1/imx477@1a" : "Two";
+      frame.raw.info = info;
       const auto origin = found(frame);
       ASSERT_TRUE(origin && origin->figures);
       EXPECT_EQ(origin->source, is_raspberry ? Source::raspberry_pi : Source::sensor_class);
       const double read_dn2 = frame.noise->offset[1] * 12'000 * 12'000 - 1.0 / 12;
       EXPECT_NEAR(origin->figures->read_noise_e, std::sqrt(read_dn2) / origin->figures->gain_dn_per_e, 1e-6);
-      std::vector<std::string> ignored;
-      const NoiseOrigin known = known_noise(frame.raw, 12'000, ignored);
       EXPECT_LE(origin->figures->read_noise_factor, known.figures->read_noise_factor);
     }
   }
@@ -161,6 +165,47 @@ TEST_F(NoiseSourceOrder, AssumesNothingWhereNoiseStays) {
   const auto huge = find_noise(automatic_, calib::NoiseFigures{.gain_dn_per_e = 1e-6, .read_noise_e = 1}, frame, one);
   ASSERT_FALSE(huge);  // 1.2e10 electrons at white
   EXPECT_EQ(huge.error().code, ErrorCode::invalid_argument);
+}
+
+// Even frames of sensors of a class, and of sensors whose gain is 4 to 16 times above or below that of their class. An
+// even frame shows the sum of the noise of light and the read noise, so that the gain is mostly that of the class. The
+// frame shows all the same that the class does not fit: then the uncertainty has to cover the gain.
+TEST_F(NoiseSourceOrder, StatesAnUncertaintyThatCoversSensorsOutsideTheirClass) {
+  constexpr int sensors = 24;
+  constexpr double range_dn = 12'000;
+  std::mt19937_64 engine(20);
+  std::normal_distribution<double> normal;
+  const auto log_uniform = [&](double low, double high) {
+    return std::exp(std::uniform_real_distribution<double>(std::log(low), std::log(high))(engine));
+  };
+  for (const bool is_outside : {false, true}) {
+    double within_one = 0, within_two = 0, count = 0;
+    for (std::uint64_t seed = 1; count < sensors; ++seed) {
+      const double iso = log_uniform(100, 6400), class_electrons = 100 / iso * calib::large_sensor_e;
+      const double outside = engine() % 2 == 0 ? log_uniform(4, 16) : 1 / log_uniform(4, 16);
+      const double ratio = is_outside ? outside : std::exp(std::log(calib::large_sensor_factor) * normal(engine));
+      const double electrons = class_electrons / ratio;
+      const double read_factor = std::exp(std::log(calib::read_noise_factor) * normal(engine));
+      SensorModel sensor = sensor_;
+      sensor.system_gain_dn_per_e = range_dn / electrons;
+      sensor.read_noise_e = calib::class_read_noise_e(electrons) * read_factor;
+      RawFrame frame = frame_of(sensor, log_uniform(1, electrons / 8), true, seed);
+      frame.raw.info.iso = iso;
+      const auto origin = found(frame);
+      ASSERT_TRUE(origin && origin->figures);
+      if (origin->source != Source::sensor_class) continue;  // the image showed its noise
+      const double error = std::abs(std::log(origin->figures->gain_dn_per_e / sensor.system_gain_dn_per_e));
+      within_one += error < std::log(origin->figures->gain_factor) ? 1 : 0;
+      within_two += error < 2 * std::log(origin->figures->gain_factor) ? 1 : 0;
+      count += 1;
+    }
+    std::printf("sensors %s their class: gain within the stated factor in %.0f %%, within its square in %.0f %%\n",
+                is_outside ? "outside" : "of", 100 * within_one / count, 100 * within_two / count);
+    if (!is_outside) {
+      EXPECT_GT(within_one / count, 2.0 / 3 - 3 * std::sqrt(2.0 / 9 / sensors));
+    }
+    EXPECT_GT(within_two / count, 0.7);
+  }
 }
 
 // Sources and errors over simulated sensors whose figures were measured by others, as a table: a dark even wall, whose
