@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
 
 #include "isp/pipeline/develop.h"
 #include "isp/pipeline/finished/clean_raw.h"
@@ -108,6 +112,62 @@ TEST(SaturationBelowWhite, LampsOfBracketsKeepTheirColour) {
     EXPECT_NEAR(found[0], 40000, 400);
     EXPECT_NEAR(found[1], 20000, 200);
     EXPECT_NEAR(found[2], 8000, 120);
+  }
+}
+
+/// Returns the level that a frame shows alone.
+std::optional<SaturationLevel> shown_by(const Burst& burst, int index) {
+  const RawFrame frame = burst.frame(index);
+  const auto plan = plan_develop(frame, burst.options(), one_thread);
+  EXPECT_TRUE(plan);
+  return plan ? plan->levels.saturation : std::nullopt;
+}
+
+TEST(SaturationBelowWhite, BracketsUseTheLowestLevelOfTheirFramesIfTheReferenceShowsNone) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const Saturation saturation = Saturation::draw(seed);
+    SCOPED_TRACE(testing::Message() << "seed " << seed << ": saturates at " << saturation.level_dn << " +- "
+                                    << saturation.scatter_dn << " DN");
+    Burst burst = saturated_night(saturation, {40000, 20000, 8000});
+    burst.light = [](int index) { return std::array{1.0 / 64, 1.0, 1.0 / 4}[static_cast<std::size_t>(index)]; };
+    EXPECT_FALSE(shown_by(burst, 0));
+    const auto bright = shown_by(burst, 1), medium = shown_by(burst, 2);
+    ASSERT_TRUE(bright || medium);
+    double lowest_dn = INFINITY;
+    for (const auto& shown : {bright, medium}) {
+      if (shown) lowest_dn = std::min(lowest_dn, shown->from_dn());
+    }
+    const MergedRaw merged = burst.merged(3, {.reference = 0});
+    ASSERT_TRUE(merged.saturation);
+    EXPECT_EQ(merged.saturation->from_dn(), lowest_dn);
+    const Rgb found = sign_of(merged.frame, test::night_full_e());
+    EXPECT_NEAR(found[0], 40000.0 / 64, 10);
+    EXPECT_NEAR(found[1], 20000.0 / 64, 5);
+    EXPECT_NEAR(found[2], 8000.0 / 64, 3);
+  }
+}
+
+TEST(SaturationBelowWhite, LampsThatTheFirstFrameDoesNotShowAreWhiteInTheMean) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const Saturation saturation = Saturation::draw(seed);
+    SCOPED_TRACE(testing::Message() << "seed " << seed << ": saturates at " << saturation.level_dn << " +- "
+                                    << saturation.scatter_dn << " DN");
+    Burst burst = saturated_night(saturation, {40000, 80000, 50000});
+    burst.disturb = [saturation](RawFrame& frame, int index) {
+      saturation.limit(frame, index);
+      if (index > 0) return;
+      for (std::size_t i = 0; i < frame.raw.dn.size(); ++i) {  // the lamps were off
+        frame.raw.dn.data()[i] = std::min<std::uint16_t>(frame.raw.dn.data()[i], 1000);
+      }
+    };
+    EXPECT_FALSE(shown_by(burst, 0));
+    const MergedRaw merged = burst.merged(4);
+    ASSERT_TRUE(merged.saturation);
+    EXPECT_NEAR(merged.saturation->mean_dn, saturation.level_dn, 8);
+    const Rect inner{sign.x + 8, sign.y + 8, sign.width - 16, sign.height - 16};
+    for (int y = inner.y; y < inner.y + inner.height; ++y) {
+      for (int x = inner.x; x < inner.x + inner.width; ++x) ASSERT_EQ(merged.frame.raw.dn.at(x, y), 65535);
+    }
   }
 }
 

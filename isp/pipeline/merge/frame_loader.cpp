@@ -63,15 +63,17 @@ Result<std::optional<NoiseProfile>> noise_at_levels(const FrameToMerge& referenc
   return out;
 }
 
+/// Returns the level of saturation that a frame shows.
+std::optional<SaturationLevel> saturation_of(const FrameToMerge& to) {
+  const Result<BlackPoint> black = choose_black_point(to.frame, to.options);
+  return black ? choose_saturation(to.frame, *black, to.options) : std::nullopt;
+}
+
 /// Returns the share of saturated sites, of some rows.
-double saturated_share(const FrameToMerge& to) {
-  const RawDn& raw = to.frame.raw;
+double saturated_share(const RawDn& raw, const std::optional<SaturationLevel>& level) {
   PerSite<double> limit_dn{};
   for (int site = 0; site < 4; ++site) limit_dn[site] = saturated_fraction_of_white * white_at(raw, site);
-  if (const Result<BlackPoint> black = choose_black_point(to.frame, to.options)) {
-    const auto level = choose_saturation(to.frame, *black, to.options);
-    if (level) limit_dn.fill(level->from_dn());
-  }
+  if (level) limit_dn.fill(level->from_dn());
   double saturated = 0, sites = 0;
   with_samples(raw, [&](const auto& samples) {
     const Rect& active = raw.active;
@@ -113,11 +115,18 @@ Result<FrameElectrons> FrameLoader::read_reference(int index) {
   if (!frame) return tl::make_unexpected(frame.error());
   clock_.lap(waiting_stage);
   with_gain_ = true;
-  Result<FrameElectrons> electrons = frame_electrons(frame->frame, frame->options, executor_, with_gain_);
+  DevelopOptions options = frame->options;
+  if (!surveyed_.empty()) {
+    const FrameSaturation& own = surveyed_[static_cast<std::size_t>(index)];
+    options.find_saturation = false;
+    options.series_saturation = own.level ? own.level : lowest_saturation(own.iso);
+  }
+  Result<FrameElectrons> electrons = frame_electrons(frame->frame, options, executor_, with_gain_);
   if (!electrons) return tl::make_unexpected(at_frame(electrons.error(), frame->name));
   clock_.lap("black and noise");
   reference_ = *std::move(frame);
-  saturation_ = electrons->saturation;
+  saturation_.reset();
+  if (electrons->saturation) saturation_ = {*electrons->saturation, electrons->saturation_e};
   dark_.reset();
   if (electrons->dark_is_estimated) dark_ = SeriesDark{electrons->dark_charge_e, reference_.frame.raw.info, true};
   return electrons;
@@ -181,20 +190,33 @@ Result<FrameElectrons> FrameLoader::next() {
 
 Result<int> FrameLoader::brightest(int count) {
   if (next_.valid()) next_.wait();  // frames are read one at a time
+  surveyed_.clear();
   int found = 0;
   double most_light = -1;
+  std::vector<FrameSaturation> surveyed;
   for (int index = 0; index < count; ++index) {
     Result<FrameToMerge> read = read_(index, false);
     if (!read) return tl::make_unexpected(read.error());
     clock_.lap(waiting_stage);
     const RawDn& raw = read->frame.raw;
     if (!raw.info.exposure_s) return 0;
+    surveyed.push_back({raw.info.iso, saturation_of(*read)});
     const double light = *raw.info.exposure_s / std::pow(raw.info.f_number.value_or(1), 2);
-    if (light <= most_light || saturated_share(*read) > most_saturated) continue;
+    if (light <= most_light || saturated_share(raw, surveyed.back().level) > most_saturated) continue;
     found = index;
     most_light = light;
   }
+  surveyed_ = std::move(surveyed);
   return found;
+}
+
+std::optional<SaturationLevel> FrameLoader::lowest_saturation(const std::optional<double>& iso) const {
+  std::optional<SaturationLevel> out;
+  for (const FrameSaturation& shown : surveyed_) {
+    if (!shown.level || differ(shown.iso, iso)) continue;
+    if (!out || shown.level->from_dn() < out->from_dn()) out = shown.level;
+  }
+  return out;
 }
 
 Result<FrameElectrons> FrameLoader::electrons_of(const FrameToMerge& read) {
@@ -206,9 +228,17 @@ Result<FrameElectrons> FrameLoader::electrons_of(const FrameToMerge& read) {
     PerSite<double>& charge_e = options.series_dark_e.emplace(dark_->charge_e);
     for (double& charge : charge_e) charge *= ratio;
   }
-  if (!differ(reference_.frame.raw.info.iso, last_.iso)) options.series_saturation = saturation_;
+  const bool has_gain_of_reference = !differ(reference_.frame.raw.info.iso, last_.iso);
+  if (has_gain_of_reference && saturation_) options.series_saturation = saturation_->level;
+  if (!surveyed_.empty()) {
+    options.find_saturation = false;
+    if (!has_gain_of_reference) options.series_saturation = lowest_saturation(last_.iso);
+  }
   Result<FrameElectrons> out = frame_electrons(read.frame, options, executor_, with_gain_);
   if (out && out->dark_is_estimated && !dark_) dark_ = SeriesDark{out->dark_charge_e, last_, false};
+  if (out && out->saturation && has_gain_of_reference && !saturation_) {
+    saturation_ = {*out->saturation, out->saturation_e};
+  }
   return out;
 }
 

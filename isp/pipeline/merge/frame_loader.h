@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <future>
 #include <optional>
 #include <string>
@@ -28,7 +29,8 @@ class FrameLoader {
   FrameLoader(const FrameLoader&) = delete;
   FrameLoader& operator=(const FrameLoader&) = delete;
 
-  /// Reads the frame that the others have to fit.
+  /// Reads the frame that the others have to fit. Its level of saturation, or the lowest that frames of its gain showed
+  /// to brightest(), is that of all frames of its gain.
   Result<FrameElectrons> read_reference(int index);
   const RawFrame& reference() const { return reference_.frame; }
   RawFrame& reference() { return reference_.frame; }
@@ -43,8 +45,19 @@ class FrameLoader {
   Result<FrameElectrons> next();
 
   /// Reads all frames, and returns the index of that with the most light, of those that are not saturated in more than
-  /// half of their sites; the first if none states its exposure, or all are.
+  /// half of their sites; the first if none states its exposure, or all are. The levels at which frames show that the
+  /// sensor saturates are kept: for each gain, the lowest one holds for the frames that show none.
   Result<int> brightest(int count);
+
+  /// Returns the frame of the reference's gain that showed first at which level the sensor saturates, and its charges
+  /// at that level, for a reference that shows none. They hold for the frames read after it.
+  struct ShownSaturation {
+    SaturationLevel level;
+    std::array<double, 3> charge_e{};  // FrameElectrons::saturation_e
+  };
+  const std::optional<ShownSaturation>& shown_saturation() const { return saturation_; }
+  /// Returns the lowest level of saturation that frames of the gain of the reference showed to brightest().
+  std::optional<SaturationLevel> lowest_saturation() const { return lowest_saturation(reference_.frame.raw.info.iso); }
 
   /// Returns whether a frame that was read differed from the reference in exposure time, aperture or gain.
   bool exposures_differ() const { return exposures_differ_; }
@@ -73,7 +86,14 @@ class FrameLoader {
     bool is_of_reference = false;
   };
   std::optional<SeriesDark> dark_;
-  std::optional<SaturationLevel> saturation_;  // that the reference shows, for all frames of its ISO
+  std::optional<SaturationLevel> lowest_saturation(const std::optional<double>& iso) const;
+  std::optional<ShownSaturation> saturation_;  // for all frames of the ISO of the reference
+  /// Holds the level of saturation that a frame shows.
+  struct FrameSaturation {
+    std::optional<double> iso;
+    std::optional<SaturationLevel> level;
+  };
+  std::vector<FrameSaturation> surveyed_;  // by brightest(), each frame; empty: not called
   std::vector<int> order_;
   std::size_t position_ = 0;
   std::future<Result<FrameToMerge>> next_;

@@ -52,6 +52,15 @@ merge::Comparison MergeContext::compared(Plane<float>& mosaic, const merge::Mosa
   return found;
 }
 
+void MergeContext::adopt_saturation() {
+  const auto& shown = loader.shown_saturation();
+  if (out.saturation || !shown) return;
+  out.saturation = shown->level;
+  for (std::size_t c = 0; c < 3; ++c) {
+    reference.saturation_e[c] = std::min(reference.saturation_e[c], shown->charge_e[c]);
+  }
+}
+
 void MergeContext::fill_unmatched(merge::MosaicMean& mean) {
   for_each_index(executor, height, [&](int y) {
     for (int x = 0; x < width; ++x) {

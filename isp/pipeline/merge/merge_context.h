@@ -42,6 +42,9 @@ struct MergeContext {
   merge::Comparison compared(Plane<float>& mosaic, const merge::MosaicNoise& noise,
                              const merge::ComparisonOptions& comparison, int index);
 
+  /// Makes the level of saturation that another frame shows that of a reference that shows none.
+  void adopt_saturation();
+
   /// Fills sites at which no frame has a value that matches the reference, a mean of several frames, with that mean.
   void fill_unmatched(merge::MosaicMean& mean);
 

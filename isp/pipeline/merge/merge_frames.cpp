@@ -65,6 +65,7 @@ Result<void> merge_static(MergeContext& work) {
   Result<merge::MosaicMean> mean = static_mean(work);
   if (!mean) return tl::make_unexpected(mean.error());
   if (!work.loader.exposures_differ()) {
+    work.adopt_saturation();
     encode_merged(*mean, work.reference, {}, work.loader.reference(), work.out, work.executor);
   }
   return {};
@@ -78,14 +79,14 @@ Result<void> merge_moved(MergeContext& work, std::map<int, merge::Motion> motion
   return {};
 }
 
-/// Makes the merge that of a bracket, and chooses its reference, unless it was named: where frames do not match, its
-/// noise is that of the result.
+/// Makes the merge that of a bracket, finds at which level its frames are saturated, and chooses its reference, unless
+/// it was named: where frames do not match, its noise is that of the result.
 Result<void> begin_bracket(MergeContext& work) {
   work.out.bracket = true;
-  if (work.options.reference) return {};
+  if (work.options.reference && work.out.saturation) return {};
   Result<int> brightest = work.loader.brightest(work.count);
   if (!brightest) return tl::make_unexpected(brightest.error());
-  work.out.reference = *brightest;
+  if (!work.options.reference) work.out.reference = *brightest;
   return {};
 }
 
@@ -100,7 +101,8 @@ Result<void> merge_once(MergeContext& work) {
   if (choice->bracket && !work.out.bracket) {
     const int first = work.out.reference;
     if (Result<void> begun = begin_bracket(work); !begun) return begun;
-    if (work.out.reference != first) return merge_once(work);
+    const bool is_saturation_new = !work.out.saturation && work.loader.lowest_saturation();
+    if (work.out.reference != first || is_saturation_new) return merge_once(work);
   }
   work.robust = choice->method.robust;
   work.out.plan = std::move(choice->plan);

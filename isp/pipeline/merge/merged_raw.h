@@ -70,8 +70,10 @@ struct FrameUse {
 struct MergedRaw {
   RawFrame frame;  // the active area only, in 16-bit codes or floating-point samples
   MergeAlignment alignment = MergeAlignment::none;
-  double baseline_exposure_ev = 0;            // for DNG: white of a bracket over that of its reference
-  std::optional<SaturationLevel> saturation;  // set where the reference shows that the sensor saturates below white
+  double baseline_exposure_ev = 0;  // for DNG: white of a bracket over that of its reference
+  /// Set where frames show that the sensor saturates below white: the level of the reference, else the lowest of the
+  /// frames of its gain in a bracket, else that of the first other frame that shows one.
+  std::optional<SaturationLevel> saturation;
   bool bracket = false;  // exposures differ: weighted by inverse variance, saturated sites left out
   int reference = 0;
   std::optional<MergePlan> plan;  // set where there is a budget

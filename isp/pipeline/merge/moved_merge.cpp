@@ -103,6 +103,7 @@ Result<void> MovedMerge::add_frames() {
 void MovedMerge::encode() {
   differences_ = {};
   placed_ = {};
+  work_.adopt_saturation();
   RawFrame& frame = work_.loader.reference();
   if (drizzle_) {
     merge::DrizzleImage image = drizzle_->finish(work_.executor);
