@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -16,6 +18,7 @@
 #include "capture/dng/dng_opcodes.h"
 #include "capture/dng/dng_tags.h"
 #include "capture/dng/tiff_directory.h"
+#include "isp/base/camera_profile.h"
 
 namespace lowlux::capture {
 namespace {
@@ -343,6 +346,30 @@ std::shared_ptr<const SourceTags> raw_source_tags(std::span<const std::byte> fil
   if (blocks.empty()) return nullptr;
   Collector collector(warnings);
   return std::make_shared<const SourceTags>(tags_of_blocks(blocks, collector));
+}
+
+void name_camera_as_file(std::span<const std::byte> file, RawFrame& frame) {
+  FrameInfo& info = frame.raw.info;
+  for (const ExifBlock& block : find_exif(file)) {
+    if (block.first != ExifBlock::First::main) continue;
+    const auto main = block.tiff.directory(block.tiff.first_directory());
+    if (!main) continue;
+    std::string make = main->text(tag::make), model = main->text(tag::model);
+    if (make.empty() || model.empty()) continue;
+    const std::string name = camera_name(info.make, info.model);
+    info.make = std::move(make);
+    info.model = std::move(model);
+    if (name.empty()) return;
+    SourceTags tags = frame.source_tags ? *frame.source_tags : SourceTags{};
+    const auto* const text = reinterpret_cast<const std::byte*>(name.c_str());
+    const std::size_t bytes = name.size() + 1;
+    tags.main.push_back({tag::unique_camera_model.id,
+                         static_cast<std::uint16_t>(TiffEntry::Type::ascii),
+                         static_cast<std::uint32_t>(bytes),
+                         {text, text + bytes}});
+    frame.source_tags = std::make_shared<const SourceTags>(std::move(tags));
+    return;
+  }
 }
 
 }  // namespace lowlux::capture

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "capture/dng/dng_file.h"
+#include "isp/base/frame.h"
 #include "isp/base/source_tags.h"
 
 namespace lowlux::capture {
@@ -23,5 +24,10 @@ std::shared_ptr<const SourceTags> dng_source_tags(std::span<const std::byte> fil
 /// Returns the tags of another raw file, or of the EXIF block of an image, that are passed on: author, copyright, XMP,
 /// IPTC, EXIF and GPS tags, without the maker note (find_exif); null if there are no EXIF data. Limits as above.
 std::shared_ptr<const SourceTags> raw_source_tags(std::span<const std::byte> file, std::vector<std::string>& warnings);
+
+/// Names the camera of a raw file that is not a DNG as the file itself does, in its tags Make and Model, where it has
+/// both (find_exif). The decoder shortens these names; its name of the camera, by which raw developers find their
+/// profiles, becomes the tag UniqueCameraModel that is passed on. Files without EXIF data, such as CRW, keep it.
+void name_camera_as_file(std::span<const std::byte> file, RawFrame& frame);
 
 }  // namespace lowlux::capture

@@ -201,6 +201,7 @@ Result<RawFrame> read_bytes(std::span<const std::byte> bytes, const ReadLimits& 
   if (!frame) return frame;
   ignore_impossible_white(frame->colour, frame->warnings);
   frame->source_tags = raw_source_tags(bytes, frame->warnings);
+  name_camera_as_file(bytes, *frame);
   return frame;
 }
 

@@ -91,4 +91,17 @@ struct CameraProfile {
 /// D750" for "NIKON CORPORATION", "Nokia RX-51" for "Nokia" and "RX-51".
 std::string camera_name(std::string_view make, std::string_view model);
 
+/// Names a camera as a file or a decoder does.
+struct CameraName {
+  std::string_view make;
+  std::string_view model;
+};
+
+/// Returns whether two names may be those of one camera: an empty make or model agrees with every other. Decoders
+/// shorten the names of files: "Nikon" "D750" is "NIKON CORPORATION" "NIKON D750". Makes agree if one contains the
+/// other, or if a model begins with the make of the other ("PENTAX K-1" of "RICOH IMAGING COMPANY, LTD." is of
+/// "Pentax"); models, if one is the end of the other, from a word on; both in any case of letters, and without a
+/// "digital camera" at the end.
+bool is_same_camera(const CameraName& one, const CameraName& other);
+
 }  // namespace lowlux

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstddef>
+
 namespace lowlux {
 namespace {
 
@@ -15,6 +18,35 @@ TEST(CameraName, NamesTheMakeOnce) {
   EXPECT_EQ(camera_name("", "RX-51"), "RX-51");
   EXPECT_EQ(camera_name("Nokia", ""), "Nokia");
   EXPECT_EQ(camera_name("", ""), "");
+}
+
+// Names as files have them and as LibRaw shortens them, and of other cameras.
+TEST(CameraName, FilesAndDecodersNameTheSameCamera) {
+  const std::array<std::array<CameraName, 2>, 9> cameras{{
+      {{{"Canon", "Canon EOS D30"}, {"Canon", "EOS D30"}}},
+      {{{"NIKON CORPORATION", "NIKON D750"}, {"Nikon", "D750"}}},
+      {{{"SONY", "ILCE-7M3"}, {"Sony", "ILCE-7M3"}}},
+      {{{"OLYMPUS IMAGING CORP.", "E-M5"}, {"Olympus", "E-M5"}}},
+      {{{"FUJIFILM", "FinePix S5Pro"}, {"Fujifilm", "S5Pro"}}},
+      {{{"RICOH IMAGING COMPANY, LTD.", "PENTAX K-1"}, {"Pentax", "K-1"}}},
+      {{{"LEICA CAMERA AG", "LEICA Q (Typ 116)"}, {"Leica", "Q (Typ 116)"}}},
+      {{{"EASTMAN KODAK COMPANY", "KODAK Z1015 IS DIGITAL CAMERA"}, {"Kodak", "Z1015 IS"}}},
+      {{{"Canon", "Canon EOS R"}, {"Canon", "EOS R"}}},
+  }};
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    for (std::size_t j = 0; j < cameras.size(); ++j) {
+      for (const CameraName& one : cameras[i]) {
+        for (const CameraName& other : cameras[j]) {
+          EXPECT_EQ(is_same_camera(one, other), i == j) << one.model << " and " << other.model;
+        }
+      }
+    }
+  }
+  EXPECT_TRUE(is_same_camera({"Canon", "Canon EOS R"}, {}));
+  EXPECT_TRUE(is_same_camera({"Canon", ""}, {"Canon", "EOS R"}));
+  EXPECT_FALSE(is_same_camera({"Canon", "Canon EOS R"}, {"Canon", "EOS R5"}));
+  EXPECT_FALSE(is_same_camera({"Canon", "Canon EOS 5D"}, {"Canon", "D"}));
+  EXPECT_FALSE(is_same_camera({"Acme", "One"}, {"Other", "One"}));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "calib/profile/profile_use.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
@@ -101,6 +102,23 @@ TEST(ProfileUse, TheErrorOfTheDoublingCountsBeyondTheTemperaturesOfTheDarks) {
       if (line_error * charge < 0.01) continue;                                       // DN, next to 0.3 of the pedestal
       EXPECT_GT(of_charge / line_error, 0.999) << "seed " << seed << ", draw " << i;  // roundings
       EXPECT_LT(of_charge / line_error, 1.09) << "seed " << seed << ", draw " << i;
+    }
+  }
+}
+
+TEST(ProfileUse, FitsRawsThatNameTheCameraAsTheFileOrTheDecoderDoes) {
+  const std::array<std::array<std::string, 2>, 2> names{{{"NIKON CORPORATION", "NIKON D750"}, {"Nikon", "D750"}}};
+  for (const auto& of_profile : names) {
+    for (const auto& of_frame : names) {
+      CameraProfile profile = two_gains();
+      profile.make = of_profile[0];
+      profile.model = of_profile[1];
+      RawDn raw = frame(100, 5, 20);
+      raw.info.make = of_frame[0];
+      raw.info.model = of_frame[1];
+      EXPECT_TRUE(profile_at(profile, raw)) << of_profile[1] << " and " << of_frame[1];
+      raw.info.model = "D7500";
+      EXPECT_FALSE(profile_at(profile, raw));
     }
   }
 }

@@ -7,6 +7,7 @@
 
 #include "capture/dng/source_tags.h"
 #include "capture/dng/tiff_directory.h"
+#include "capture/file/dng_source.h"
 #include "tests/support/dng/dng_builder.h"
 
 namespace lowlux::capture {
@@ -183,6 +184,23 @@ TEST(SourceTags, ADamagedGpsTagIsCalledOne) {
   EXPECT_EQ(tags_of(file, warnings)->gps.size(), 1u);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0], "GPS tag 2 is not copied: its values lie beyond the end of the file");
+}
+
+// An uncompressed TIFF raw that is not a DNG: LibRaw decodes it.
+TEST(SourceTags, CamerasOfOtherRawsAreNamedAsTheFileDoes) {
+  for (const bool big_endian : {false, true}) {
+    DngBuilder raw;
+    raw.big_endian = big_endian;
+    raw.width = 64, raw.height = 48;
+    for (const std::uint16_t id : {50706, 50707, 50708}) raw.remove(id);  // DNGVersion and UniqueCameraModel
+    raw.set(271, Tag::text("NIKON CORPORATION")).set(272, Tag::text("NIKON D750"));
+    const auto frame = read_raw(raw.build(), "a.nef");
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_EQ(frame->raw.info.make, "NIKON CORPORATION");
+    EXPECT_EQ(frame->raw.info.model, "NIKON D750");
+    ASSERT_TRUE(frame->source_tags);
+    EXPECT_EQ(text_of(frame->source_tags->main, 50708), "Nikon D750");
+  }
 }
 
 }  // namespace

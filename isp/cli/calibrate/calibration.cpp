@@ -65,8 +65,7 @@ Result<RawFrame> read_calibration_frame(const std::string& file, const Calibrate
 }
 
 Result<void> put_camera(const FrameInfo& info, CameraProfile& profile) {
-  const auto differs = [](const std::string& a, const std::string& b) { return !a.empty() && !b.empty() && a != b; };
-  if (differs(profile.make, info.make) || differs(profile.model, info.model)) {
+  if (!is_same_camera({profile.make, profile.model}, {info.make, info.model})) {
     return fail(ErrorCode::invalid_argument,
                 fmt::format(R"(the profile is of "{}", what is to be added of "{}")",
                             camera_name(profile.make, profile.model), camera_name(info.make, info.model)));

@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 
+#include "isp/cli/calibrate/calibration.h"
 #include "isp/pipeline/plan/plan_develop.h"
 #include "tests/pipeline/night_frames.h"
 
@@ -107,6 +109,20 @@ TEST(ProfileOption, HasOneNoiseForAllImagesThatDarkFramesAreSubtractedFrom) {
   const NoiseProfile one = noise_of(5), other = noise_of(50);
   EXPECT_EQ(one.scale, other.scale);
   EXPECT_EQ(one.offset, other.offset);
+}
+
+TEST(ProfileOption, FramesOfOneCameraAreAddedUnderEitherOfItsNames) {
+  FrameInfo file, decoder, other;
+  file.make = "Canon", file.model = "Canon EOS R";
+  decoder.make = "Canon", decoder.model = "EOS R";
+  other.make = "Canon", other.model = "Canon EOS R5";
+  CameraProfile profile;
+  ASSERT_TRUE(put_camera(decoder, profile));
+  EXPECT_TRUE(put_camera(file, profile));
+  EXPECT_EQ(profile.model, "EOS R");
+  const auto refused = put_camera(other, profile);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("Canon EOS R5"), std::string::npos) << refused.error().message;
 }
 
 }  // namespace
