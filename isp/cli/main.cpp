@@ -74,8 +74,9 @@ int run_verb(const std::vector<std::string>& args) {
   }
   std::array<std::string_view, verbs.size()> names;
   std::ranges::transform(verbs, names.begin(), &Verb::name);
-  print_err(fmt::format("{}\n", one_line(fmt::format("lowlux: unknown verb '{}'{}; `lowlux --help` lists them", first,
-                                                     suggestion(first, names)))));
+  const std::string wrong = fmt::format("unknown verb '{}'{}", first, suggestion(first, names));
+  print_failure_json({}, {ErrorCode::invalid_argument, wrong, {}}, failure_json(first, args));
+  print_err(one_line(fmt::format("lowlux: {}; `lowlux --help` lists them", wrong)) + "\n");
   return exit_usage;
 }
 
@@ -109,6 +110,13 @@ int run_help(const std::vector<std::string>& args) {
   return exit_done;
 }
 
+/// Prints a failure of the command as a whole. @return exit_failed
+int print_breakdown(const Error& error, const std::vector<std::string>& args) {
+  if (!args.empty()) print_failure_json({}, error, failure_json(args.front(), args));
+  print_err(one_line("lowlux: " + error.message) + "\n");
+  return exit_failed;
+}
+
 int run(std::vector<std::string> args) {
   if (args.empty()) {
     print_err(help_text());
@@ -132,8 +140,7 @@ int run(std::vector<std::string> args) {
     return exit_done;
   }
   if (!isp::cpu_runs_raw_to_rgb()) {
-    print_err("lowlux: this processor lacks SSSE3, which the kernels need\n");
-    return exit_failed;
+    return print_breakdown({ErrorCode::unsupported, "this processor lacks SSSE3, which the kernels need", {}}, args);
   }
   return run_verb(args);
 }
@@ -155,9 +162,9 @@ int run_process(const std::vector<std::string>& args) {
   try {
     code = run(args);
   } catch (const std::bad_alloc&) {
-    print_err("lowlux: not enough memory\n");
+    code = print_breakdown({ErrorCode::too_large, "not enough memory", {}}, args);
   } catch (const std::exception& failure) {
-    print_err(fmt::format("{}\n", one_line(std::string("lowlux: ") + failure.what())));
+    code = print_breakdown({ErrorCode::unsupported, failure.what(), {}}, args);
   }
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
   print_err("lowlux: cannot write to standard output\n");

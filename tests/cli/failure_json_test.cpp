@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -23,10 +24,10 @@ using Words = std::vector<std::string>;
 class FailureJson : public test::SimulateCommand {
  protected:
   /// Runs the command with --json and expects a failure of `where`, as a line and as JSON.
-  static Json failed(Words words, const std::string& where) {
-    words.emplace_back("--json");
+  static Json failed(Words words, const std::string& where, int exit_code = 1) {
+    words.insert(words.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(words.size(), 2)), "--json");
     const auto result = lowlux(words);
-    EXPECT_EQ(result.exit_code, 1) << testing::PrintToString(words);
+    EXPECT_EQ(result.exit_code, exit_code) << testing::PrintToString(words);
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     Json json = Json::parse(result.out, nullptr, false);
     EXPECT_FALSE(json.is_discarded()) << testing::PrintToString(words) << result.out;
@@ -63,6 +64,59 @@ TEST_F(FailureJson, OfVerbsWithOneResultIsAnObject) {
   EXPECT_TRUE(failed({"retarget", file("no.png"), "-o", file("x.png")}, file("no.png")).is_object());
   EXPECT_TRUE(failed({"calibrate", "black", file("empty"), "-o", file("p.json")}, file("empty")).is_object());
   EXPECT_EQ(scratch_.names(), Words{"empty"});
+}
+
+// Unknown options, missing arguments, values that are not valid, and options that contradict each other.
+TEST_F(FailureJson, OfUsageHasTheFormOfTheVerb) {
+  std::vector<Words> verbs{{"merge"},
+                           {"capture"},
+                           {"retarget"},
+                           {"resaturate"},
+                           {"simulate"},
+                           {"dataset"},
+                           {"compare"},
+                           {"doctor"},
+                           {"calibrate", "black"},
+                           {"calibrate", "noise"},
+                           {"calibrate", "colour"},
+                           {"calibrate", "quoted"},
+                           {"calibrate", "sheet"}};
+  if (test::has_measurement()) verbs.insert(verbs.end(), {{"bench"}, {"reproduce"}});
+  for (Words verb : verbs) {
+    verb.emplace_back("--nonsense");
+    EXPECT_TRUE(failed(verb, "", 2).is_object()) << testing::PrintToString(verb);
+    if (verb.front() == "doctor" || verb.front() == "bench" || verb.front() == "reproduce") continue;
+    verb.pop_back();
+    EXPECT_TRUE(failed(verb, "", 2).is_object()) << testing::PrintToString(verb);
+  }
+  for (const std::string verb : {"develop", "denoise", "info"}) {
+    EXPECT_TRUE(failed({verb}, "", 2).is_array()) << verb;
+    EXPECT_TRUE(failed({verb, dog, "--nonsense"}, "", 2).is_array()) << verb;
+  }
+  const std::string image = test::raws + "../pictures/kodim05.png";
+  EXPECT_TRUE(failed({"develop", dog, "-o", file("x.png"), "--demosaic", "none"}, "", 2).is_array());
+  EXPECT_TRUE(
+      failed({"develop", dog, "-o", file("x.png"), "--budget-ms", "3", "--budget-mpps", "4"}, "", 2).is_array());
+  EXPECT_TRUE(failed({"develop", dog, "-o", file("x.foo")}, file("x.foo"), 2).is_array());
+  EXPECT_TRUE(failed({"denoise", dog, "-o", file("x.png")}, "-o", 2).is_array());
+  EXPECT_TRUE(failed({"denoise", dog, "-o", file("x.dng"), "--denoise="}, "", 2).is_array());
+  EXPECT_TRUE(failed({"info", "--advise", "--sensor", "none"}, "", 2).is_object());
+  EXPECT_TRUE(failed({"merge", dog, "-o", file("x.dng"), "--reference", "8"}, "--reference", 2).is_object());
+  EXPECT_TRUE(failed({"simulate", "flat", "-o", file("x.dng"), "--sensor", "none"}, "", 2).is_object());
+  EXPECT_TRUE(failed({"simulate", "flat"}, "", 2).is_object());
+  EXPECT_TRUE(failed({"retarget", image, "-o", file("x.foo")}, file("x.foo"), 2).is_object());
+  EXPECT_TRUE(failed({"calibrate"}, "", 2).is_object());
+  EXPECT_TRUE(failed({"fry", "x"}, "", 2).is_object());
+  EXPECT_TRUE(scratch_.names().empty());
+}
+
+TEST_F(FailureJson, OfAVideoIsOnStandardError) {
+  const auto result = lowlux({"capture", "--live", "--json", "--nonsense"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.out, "");
+  const std::size_t end = result.err.find("}\n");
+  ASSERT_NE(end, std::string::npos) << result.err;
+  EXPECT_EQ(Json::parse(result.err.substr(0, end + 1))["ok"], false);
 }
 
 TEST_F(FailureJson, ListsAreJsonToo) {

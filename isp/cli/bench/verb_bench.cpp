@@ -157,10 +157,10 @@ int run_bench(const std::vector<std::string>& words) {
   if (args.list) return list_stages(args.json);
   if (args.calibrate_cost) return run_calibrate_cost(args);
   const auto to_run = chosen(args);
-  if (!to_run) return print_usage_error("bench", to_run.error());
+  if (!to_run) return print_usage_error("bench", to_run.error(), object_if(args.json));
   const std::vector<isp::BenchStage>& stages = to_run->stages;
   auto methods = all_methods(args);
-  if (!methods) return print_usage_error("bench", methods.error());
+  if (!methods) return print_usage_error("bench", methods.error(), object_if(args.json));
   auto options = bench_options(args);
   if (!options) return print_failure(options.error(), object_if(args.json));
   options->shard = to_run->lights;

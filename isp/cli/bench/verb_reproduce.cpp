@@ -155,7 +155,7 @@ int run_reproduce(const std::vector<std::string>& words) {
   const auto& args = std::get<ReproduceArgs>(parsed);
   if (args.list) return list_experiments(args.json);
   const auto experiments = chosen_experiments(args.experiments);
-  if (!experiments) return print_usage_error("reproduce", experiments.error());
+  if (!experiments) return print_usage_error("reproduce", experiments.error(), object_if(args.json));
   if (const auto error = in_the_way(args)) return print_failure(*error, object_if(args.json));
   const std::vector<Done> done = run_experiments(*experiments, args);
   if (!args.output.empty()) {

@@ -196,15 +196,17 @@ int run_capture(const std::vector<std::string>& words) {
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<CaptureArgs>(parsed);
   if (args.list) return list_cameras(args.develop.json);
+  const bool is_video = args.kind == CaptureKind::live;
+  const FailureJson json = is_video && args.develop.json ? FailureJson::object_on_stderr : object_if(args.develop.json);
   if (args.kind == CaptureKind::pictures) {
     const auto format = isp::format_of(frame_file(args, 1));
-    if (!format) return print_usage_error("capture", format.error());
+    if (!format) return print_usage_error("capture", format.error(), json);
     if (const auto fits = complete_options(args.develop, *format); !fits)
-      return print_usage_error("capture", fits.error(), args.develop.defaults);
+      return print_usage_error("capture", fits.error(), json, args.develop.defaults);
   }
-  if (args.kind == CaptureKind::live && ::isatty(STDOUT_FILENO) == 1) {
-    return print_usage_error("capture",
-                             {ErrorCode::invalid_argument, "writes video: pipe it to a player, | ffplay -", "--live"});
+  if (is_video && ::isatty(STDOUT_FILENO) == 1) {
+    return print_usage_error(
+        "capture", {ErrorCode::invalid_argument, "writes video: pipe it to a player, | ffplay -", "--live"}, json);
   }
   listen_to_signals();
   Capture capture(args);

@@ -16,17 +16,20 @@ int run_denoise(const std::vector<std::string>& words) {
   Parsed<DevelopArgs> parsed = parse_denoise(words);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& args = std::get<DevelopArgs>(parsed);
+  const FailureJson json = is_standard_stream(args.output) ? FailureJson::none : array_if(args.json);
 
   Result<std::vector<Job>> jobs = plan_outputs(args, "dng");
-  if (!jobs) return print_argument_error("denoise", jobs.error(), args.defaults, array_if(args.json));
+  if (!jobs) return print_argument_error("denoise", jobs.error(), args.defaults, json);
   if (!jobs->front().output.ends_with(".dng") && !is_standard_stream(jobs->front().output)) {
-    return print_usage_error("denoise", {ErrorCode::invalid_argument,
-                                         "denoised raw files are written as DNG: the name must end with .dng", "-o"});
+    return print_usage_error(
+        "denoise",
+        {ErrorCode::invalid_argument, "denoised raw files are written as DNG: the name must end with .dng", "-o"},
+        json);
   }
   const Result<CalibrationFiles> calibration = calibration_files(args, *jobs);
-  if (!calibration) return print_argument_error("denoise", calibration.error(), args.defaults, array_if(args.json));
+  if (!calibration) return print_argument_error("denoise", calibration.error(), args.defaults, json);
   Result<RawBatch> batch = make_batch(args, without_rendering(args.options), *std::move(jobs), *calibration);
-  if (!batch) return print_failure(batch.error(), array_if(args.json));
+  if (!batch) return print_failure(batch.error(), json);
   batch->bytes_of = isp::clean_raw_bytes;
   return run_batch(*batch, [&](const Job& job, Executor& executor, FileProgress& progress, DevelopOutcome& out) {
     return denoise_frame(*batch, job, executor, progress, out).and_then([&](const DenoisedFrame& denoised) {

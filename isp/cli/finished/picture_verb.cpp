@@ -39,11 +39,11 @@ Result<void> write_made(const PictureVerb& verb, const Picture& picture, OutputS
 
 int run_picture_verb(const PictureVerb& verb, const PictureWork& work) {
   const Result<isp::FileFormat> format = isp::format_of(verb.output);
-  if (!format) return print_usage_error(verb.name, format.error());
+  if (!format) return print_usage_error(verb.name, format.error(), object_if(verb.json));
   const Result<PictureKind> kind = picture_kind(*format, verb.bits, std::nullopt);
-  if (!kind) return print_usage_error(verb.name, kind.error(), verb.defaults);
+  if (!kind) return print_usage_error(verb.name, kind.error(), object_if(verb.json), verb.defaults);
   if (const std::string wrong = wrong_names({verb.output}, verb.inputs); !wrong.empty()) {
-    return print_usage_error(verb.name, {ErrorCode::invalid_argument, wrong, "-o"});
+    return print_usage_error(verb.name, {ErrorCode::invalid_argument, wrong, "-o"}, object_if(verb.json));
   }
   if (const auto place = check_place(verb.output, verb.force); !place) return failed(verb, place.error());
   PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));

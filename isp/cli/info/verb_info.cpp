@@ -40,7 +40,7 @@ std::optional<NoiseOrigin> noise_of(RawFrame& frame, Executor& executor) {
 int failed(const InfoArgs& args, const std::string& file, const Error& error) {
   if (error.code != ErrorCode::invalid_argument) return print_failure(file, error, object_if(args.json));
   const std::string place = error.where.empty() ? "" : " (" + error.where + ")";
-  return print_usage_error("info", {error.code, error.message + place, {}});
+  return print_usage_error("info", {error.code, error.message + place, {}}, object_if(args.json));
 }
 
 /// Advises on the frames of a merge.

@@ -189,11 +189,31 @@ CLI::Option* add_number_within(CLI::App& app, const std::string& flag, const std
                   });
 }
 
-int refuse(const CLI::App& app, const std::string& wrong) {
+namespace {
+
+/// Returns the name of a verb: "calibrate black".
+std::string_view verb_of(const std::string& app_name) {
+  constexpr std::string_view command = "lowlux ";
+  return std::string_view(app_name).substr(app_name.starts_with(command) ? command.size() : 0);
+}
+
+int refuse_as(const CLI::App& app, const std::string& wrong, FailureJson json) {
   const std::string place = default_place(app, wrong);
+  print_failure_json({}, {ErrorCode::invalid_argument, wrong, place}, json);
   print_err(fmt::format("{}\n", one_line(fmt::format("{}: {}{}{}; --help lists the options", app.get_name(), place,
                                                      place.empty() ? "" : ": ", wrong))));
   return exit_usage;
+}
+
+}  // namespace
+
+int refuse(const CLI::App& app, const std::string& wrong) {
+  return refuse_as(app, wrong,
+                   failure_json(verb_of(app.get_name()), [&](std::string_view flag, std::string_view value) {
+                     const CLI::Option* const option = app.get_option_no_throw(std::string(flag));
+                     if (option == nullptr || option->count() == 0) return false;
+                     return value.empty() || option->results().back() == value;
+                   }));
 }
 
 namespace {
@@ -240,14 +260,15 @@ std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& wo
     print_out(help_in_form(help_page(app), words.front()).value_or(""));
     return exit_done;
   }
+  const FailureJson json = failure_json(verb_of(app.get_name()), words);
   for (const std::string& word : words) {
     if (word == "--") break;
     if (!word.starts_with("--") || !word.ends_with('=')) continue;
     const std::string flag = word.substr(0, word.size() - 1);
-    if (app.get_option_no_throw(flag) != nullptr) return refuse(app, flag + " has no value");
+    if (app.get_option_no_throw(flag) != nullptr) return refuse_as(app, flag + " has no value", json);
   }
   const Result<Defaults> defaults = find_defaults(app, words, left_out);
-  if (!defaults) return print_failure(defaults.error()), exit_usage;
+  if (!defaults) return print_failure(defaults.error(), json), exit_usage;
   try {
     parse_all(app, words, *defaults);
   } catch (const CLI::ParseError& error) {
@@ -256,8 +277,8 @@ std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& wo
       print_out(error.get_name() == "CallForAllHelp" ? full_help(page) : short_help(page));
       return exit_done;
     }
-    if (const auto unknown = unknown_option(app)) return refuse(app, *unknown);
-    return refuse(app, error_text(error));
+    if (const auto unknown = unknown_option(app)) return refuse_as(app, *unknown, json);
+    return refuse_as(app, error_text(error), json);
   }
   if (const CLI::Option* const empty = empty_option(app)) return refuse(app, empty->get_name() + " has no value");
   if (used != nullptr) *used = *defaults;

@@ -42,14 +42,14 @@ int run_simulate(const std::vector<std::string>& words) {
     return exit_done;
   }
   if (const std::string wrong = wrong_files(args); !wrong.empty()) {
-    return print_usage_error("simulate", {ErrorCode::invalid_argument, wrong, {}});
+    return print_usage_error("simulate", {ErrorCode::invalid_argument, wrong, {}}, object_if(args.json));
   }
   const Result<SimulateOutcome> outcome = simulate(args);
   if (!outcome) {
     const Error& error = outcome.error();
     if (error.code != ErrorCode::invalid_argument) return print_failure(args.scene.what, error, object_if(args.json));
     const std::string place = error.where.empty() ? "" : " (" + error.where + ")";
-    return print_usage_error("simulate", {error.code, error.message + place, {}});
+    return print_usage_error("simulate", {error.code, error.message + place, {}}, object_if(args.json));
   }
   print_simulated(args, *outcome);
   return exit_done;
