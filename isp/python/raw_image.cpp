@@ -5,7 +5,9 @@
 #include <pybind11/stl.h>
 
 #include "capture/file/dng_source.h"
+#include "isp/cli/develop/develop_args.h"
 #include "isp/cli/shared/machine.h"
+#include "isp/cli/shared/option_values.h"
 #include "isp/output/dng/dng_check.h"
 #include "isp/output/dng/dng_writer.h"
 #include "isp/python/failure.h"
@@ -127,12 +129,19 @@ RawImagePtr read_raw(const std::string& path) {
   return out;
 }
 
-void write_dng(const RawImage& image, const std::string& path, bool overwrite, bool compressed) {
+isp::DngCompression compression_named(const std::string& name) {
+  const auto& names = cli::compression_names();
+  const auto found = names.find(name);
+  if (found != names.end()) return found->second;
+  throw Failure({ErrorCode::invalid_argument, "'" + name + "' is none of " + cli::joined(names), "compression"});
+}
+
+void write_dng(const RawImage& image, const std::string& path, bool overwrite, const std::string& compression) {
   const py::gil_scoped_release released;
   value_of(isp::write_dng(image.frame, path,
                           {.overwrite = overwrite ? isp::Overwrite::yes : isp::Overwrite::no,
                            .software = "lowlux " + cli::version_number(),
-                           .compression = compressed ? isp::DngCompression::lossless : isp::DngCompression::none}));
+                           .compression = compression_named(compression)}));
 }
 
 RawImagePtr from_array(const py::array& mosaic, std::vector<double> black_dn_, std::vector<double> white_dn_,

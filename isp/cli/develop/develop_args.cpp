@@ -38,7 +38,7 @@ void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
 
 void add_compression(CLI::App& app, DevelopArgs& args) {
   add_choice<isp::DngCompression>(
-      app, "--compression", {{"none", isp::DngCompression::none}, {"lossless", isp::DngCompression::lossless}},
+      app, "--compression", compression_names(),
       [&args](isp::DngCompression compression) { args.compression = compression; },
       "compression of the DNG: none or lossless (default: none)");
 }
@@ -144,6 +144,12 @@ Parsed<DevelopArgs> parse_develop_without(const std::set<std::string>& left_out,
 }
 
 }  // namespace
+
+const Names<isp::DngCompression>& compression_names() {
+  static const Names<isp::DngCompression> names{{"none", isp::DngCompression::none},
+                                                {"lossless", isp::DngCompression::lossless}};
+  return names;
+}
 
 Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words,
                                   const std::function<bool(const DevelopArgs&)>& contradicts) {

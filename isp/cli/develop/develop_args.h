@@ -13,6 +13,7 @@
 #include "isp/cli/develop/look_args.h"
 #include "isp/cli/info/advise_args.h"
 #include "isp/cli/merge/merge_args.h"
+#include "isp/cli/shared/option_values.h"
 #include "isp/output/dng/dng_writer.h"
 #include "isp/pipeline/options.h"
 
@@ -36,6 +37,9 @@ struct DarkArgs {
 
 /// Limits exposures [EV]: the range of the tone curve.
 inline constexpr double max_exposure_ev = 12;
+
+/// Returns the names of the compressions of DNGs, with the default first.
+const Names<isp::DngCompression>& compression_names();
 
 /// Holds the arguments of `develop`, and of `denoise` and `merge` where they have the option, checked as far as that is
 /// possible without opening a file.

@@ -21,7 +21,7 @@ def _stored(folder, name, value):
     for index, frame in enumerate(_listed(name, value)):
         if isinstance(frame, RawImage):
             path = os.path.join(folder, f"{name}_{index}.dng")
-            _lowlux.write_dng(frame, os.fsencode(path), False, False)
+            _lowlux.write_dng(frame, os.fsencode(path), False, "none")
             frame = path
         out.append(frame)
     return out

@@ -85,8 +85,6 @@ def write_dng(path, mosaic, *, black=None, white=None, cfa=None, noise=None, mat
     if not path.endswith(b".dng"):
         name = os.fsdecode(path)
         raise _errors.ArgumentError(f"{name}: a raw file is written as DNG: its name ends with .dng", name)
-    if compression not in (None, "none", "lossless"):
-        raise _errors.ArgumentError(f'compression: {compression!r} is neither "none" nor "lossless"', "compression")
     figures = dict(black=black, white=white, cfa=cfa, noise=noise, matrix=matrix, exposure_s=exposure_s, iso=iso,
                    like=like)
     if isinstance(mosaic, RawImage):
@@ -96,7 +94,7 @@ def write_dng(path, mosaic, *, black=None, white=None, cfa=None, noise=None, mat
         frame = mosaic
     else:
         frame = raw_from_array(mosaic, **figures)
-    _lowlux.write_dng(frame, path, overwrite, compression == "lossless")
+    _lowlux.write_dng(frame, path, overwrite, "none" if compression is None else bytes_of(compression, "compression"))
 
 
 def _colours(raw, rows, columns):
