@@ -30,6 +30,15 @@ constexpr std::array<Mosaic, 20> mosaics{{
 }};
 constexpr std::string_view clean_suffix = "16le";  // of denoised mosaics
 
+/// Names monochrome frames as GStreamer and V4L2 do.
+struct Grey {
+  const char* name;
+  std::uint32_t fourcc;
+  int bits;
+};
+
+constexpr std::array<Grey, 2> greys{{{"GRAY8", v4l2("GREY"), 8}, {"GRAY16_LE", v4l2("Y16 "), 16}}};
+
 /// Names an output as GStreamer and the stage do. Both name the order of bytes in memory.
 struct Picture {
   const char* name;
@@ -99,6 +108,19 @@ bool has_order(const GValue* format, std::string_view name) {
   return G_VALUE_HOLDS_STRING(format) && std::string_view(g_value_get_string(format)).starts_with(name.substr(0, 4));
 }
 
+/// Returns whether a format, or one in a list of formats, is monochrome.
+bool has_grey(const GValue* format) {
+  if (format == nullptr) return true;
+  if (GST_VALUE_HOLDS_LIST(format)) {
+    for (guint i = 0; i < gst_value_list_get_size(format); ++i) {
+      if (has_grey(gst_value_list_get_value(format, i))) return true;
+    }
+    return false;
+  }
+  const char* const name = G_VALUE_HOLDS_STRING(format) ? g_value_get_string(format) : nullptr;
+  return name != nullptr && std::ranges::find(greys, std::string_view(name), &Grey::name) != greys.end();
+}
+
 /// Copies a structure under another name, with those of its members that say nothing of formats.
 GstStructure* same_frames(const GstStructure* from, const char* name) {
   GstStructure* out = gst_structure_new_empty(name);
@@ -125,9 +147,11 @@ int bits_of(std::string_view name) { return name.size() == 4 ? 8 : 10 * (name[4]
 }  // namespace
 
 GstCaps* sink_template() {
-  GstStructure* structure = any_size(bayer);
-  set_mosaics(structure, [](std::string_view) { return true; });
-  return gst_caps_new_full(structure, nullptr);
+  GstStructure* mosaic = any_size(bayer);
+  set_mosaics(mosaic, [](std::string_view) { return true; });
+  GstStructure* grey = any_size(raw);
+  set_names(grey, "format", {greys[0].name, greys[1].name});
+  return gst_caps_new_full(mosaic, grey, nullptr);
 }
 
 GstCaps* source_template() {
@@ -145,33 +169,48 @@ GstCaps* other_caps(GstPadDirection direction, const GstCaps* caps) {
     const GValue* format = gst_structure_get_value(from, "format");
     const bool from_mosaic = gst_structure_has_name(from, bayer) != FALSE;
     if (direction == GST_PAD_SINK) {
+      if (!from_mosaic && !has_grey(format)) continue;
       out = with_pictures(out, same_frames(from, raw));
+      if (!from_mosaic) continue;
     }
     GstStructure* mosaic = same_frames(from, bayer);
     set_mosaics(mosaic, [&](std::string_view name) {
       return (direction == GST_PAD_SRC || name.ends_with(clean_suffix)) && (!from_mosaic || has_order(format, name));
     });
     out = gst_caps_merge_structure(out, mosaic);
+    if (direction == GST_PAD_SINK || from_mosaic) continue;
+    GstStructure* grey = same_frames(from, raw);
+    set_names(grey, "format", {greys[0].name, greys[1].name});
+    out = gst_caps_merge_structure(out, grey);
   }
   return out;
 }
 
-std::optional<BayerCaps> read_bayer_caps(const GstCaps* caps) {
-  BayerCaps out;
+std::optional<InputCaps> read_input_caps(const GstCaps* caps) {
+  InputCaps out;
   const GstStructure* structure = fixed_structure(caps, out.width, out.height);
-  if (structure == nullptr || gst_structure_has_name(structure, bayer) == FALSE) return std::nullopt;
-  const char* name = gst_structure_get_string(structure, "format");
-  const auto* const mosaic = std::ranges::find(mosaics, name == nullptr ? "" : std::string_view(name), &Mosaic::name);
-  if (mosaic == mosaics.end()) return std::nullopt;
-  out.fourcc = mosaic->fourcc;
-  out.bits = bits_of(mosaic->name);
+  if (structure == nullptr) return std::nullopt;
+  const char* const format = gst_structure_get_string(structure, "format");
+  const std::string_view name = format == nullptr ? "" : format;
+  out.is_mosaic = gst_structure_has_name(structure, bayer) != FALSE;
+  if (out.is_mosaic) {
+    const auto* const mosaic = std::ranges::find(mosaics, name, &Mosaic::name);
+    if (mosaic == mosaics.end()) return std::nullopt;
+    out.fourcc = mosaic->fourcc;
+    out.bits = bits_of(mosaic->name);
+  } else {
+    const auto* const grey = std::ranges::find(greys, name, &Grey::name);
+    if (grey == greys.end() || gst_structure_has_name(structure, raw) == FALSE) return std::nullopt;
+    out.fourcc = grey->fourcc;
+    out.bits = grey->bits;
+  }
   const std::size_t sample_bytes = out.bits == 8 ? 1 : 2;
   out.row_bytes = static_cast<std::size_t>(out.width) * sample_bytes;
-  out.stride = padded(static_cast<std::size_t>(out.width)) * sample_bytes;
+  out.stride = out.is_mosaic ? padded(static_cast<std::size_t>(out.width)) * sample_bytes : padded(out.row_bytes);
   return out;
 }
 
-std::size_t BayerCaps::stride_of(std::size_t bytes) const {
+std::size_t InputCaps::stride_of(std::size_t bytes) const {
   const auto rows = static_cast<std::size_t>(height);
   for (const std::size_t shorter : {padded(row_bytes), row_bytes}) {
     if (shorter < stride && bytes == shorter * rows) return shorter;
@@ -180,8 +219,8 @@ std::size_t BayerCaps::stride_of(std::size_t bytes) const {
 }
 
 std::optional<OutputCaps> read_output_caps(const GstCaps* caps) {
-  if (const std::optional<BayerCaps> mosaic = read_bayer_caps(caps)) {
-    if (mosaic->bits != 16) return std::nullopt;
+  if (const std::optional<InputCaps> mosaic = read_input_caps(caps)) {
+    if (!mosaic->is_mosaic || mosaic->bits != 16) return std::nullopt;
     return OutputCaps{
         .fourcc = LOWLUX_STAGE_BAYER16, .stride = mosaic->stride, .width = mosaic->width, .height = mosaic->height};
   }

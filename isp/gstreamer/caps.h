@@ -10,14 +10,16 @@
 
 namespace lowlux::gst {
 
-/// Describes the frames of video/x-bayer caps.
-struct BayerCaps {
+/// Describes the frames of video/x-bayer caps, or of monochrome video/x-raw caps.
+struct InputCaps {
   std::uint32_t fourcc = 0;  // V4L2's
   int bits = 0;
+  bool is_mosaic = true;  // false: monochrome
   int width = 0;
   int height = 0;
   std::size_t row_bytes = 0;  // of the samples of a row
-  std::size_t stride = 0;     // GStreamer's of such frames, as bayer2rgb has it: rows are padded to 4 pixels
+  std::size_t stride = 0;     // GStreamer's of such frames: rows are padded to 4 pixels as bayer2rgb has it, monochrome
+                              // ones to 4 bytes
 
   /// Returns the stride of a frame without metadata. Sources hand on the rows of drivers, which are padded to 4 bytes
   /// or not at all: frames of exactly that size have them.
@@ -36,18 +38,18 @@ struct OutputCaps {
   std::size_t bytes() const { return is_mosaic() ? stride * static_cast<std::size_t>(height) : picture.size; }
 };
 
-/// Returns what the sink pad accepts: mosaics of 8 to 16 bits. The caller owns the caps.
+/// Returns what the sink pad accepts: mosaics of 8 to 16 bits, GRAY8 and GRAY16_LE. The caller owns the caps.
 GstCaps* sink_template();
 /// Returns what the source pad offers: RGBx, BGRx, RGB, BGR, NV12, and mosaics of 16 bits. The caller owns the caps.
 GstCaps* source_template();
 
 /// Returns the caps of the other pad that go with these: the same size, rate and pixels; of mosaics the same order of
-/// colours. The caller owns the caps.
+/// colours; of monochrome frames images only. The caller owns the caps.
 GstCaps* other_caps(GstPadDirection direction, const GstCaps* caps);
 
 /// Returns what fixed caps describe; nullopt if they are not such caps, or not of a size of 2 to 65,535 pixels each
 /// way.
-std::optional<BayerCaps> read_bayer_caps(const GstCaps* caps);
+std::optional<InputCaps> read_input_caps(const GstCaps* caps);
 std::optional<OutputCaps> read_output_caps(const GstCaps* caps);
 
 }  // namespace lowlux::gst

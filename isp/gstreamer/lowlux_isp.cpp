@@ -20,7 +20,7 @@ namespace {
 struct State {
   Properties properties;  // under the lock of the object
   lowlux_stage* stage = nullptr;
-  std::optional<BayerCaps> in;
+  std::optional<InputCaps> in;
   std::optional<OutputCaps> out;
   const char* warning = nullptr;  // that was posted last
 };
@@ -104,7 +104,7 @@ int matrix_of(const OutputCaps& out) {
 
 gboolean set_caps(GstBaseTransform* element, GstCaps* in_caps, GstCaps* out_caps) {
   State& state = state_of(element);
-  state.in = read_bayer_caps(in_caps);
+  state.in = read_input_caps(in_caps);
   state.out = read_output_caps(out_caps);
   if (!state.in || !state.out) {
     GST_ELEMENT_ERROR(
@@ -137,7 +137,7 @@ gboolean set_caps(GstBaseTransform* element, GstCaps* in_caps, GstCaps* out_caps
 gboolean transform_size(GstBaseTransform* /*element*/, GstPadDirection direction, GstCaps* /*caps*/, gsize size,
                         GstCaps* other, gsize* other_size) {
   if (direction == GST_PAD_SRC) {
-    const std::optional<BayerCaps> in = read_bayer_caps(other);
+    const std::optional<InputCaps> in = read_input_caps(other);
     *other_size = in ? in->stride * static_cast<std::size_t>(in->height) : size;
     return static_cast<gboolean>(in.has_value());
   }
@@ -147,7 +147,7 @@ gboolean transform_size(GstBaseTransform* /*element*/, GstPadDirection direction
 }
 
 gboolean get_unit_size(GstBaseTransform* /*element*/, GstCaps* caps, gsize* size) {
-  if (const std::optional<BayerCaps> mosaic = read_bayer_caps(caps)) {
+  if (const std::optional<InputCaps> mosaic = read_input_caps(caps)) {
     *size = mosaic->stride * static_cast<std::size_t>(mosaic->height);
     return TRUE;
   }

@@ -39,25 +39,26 @@ struct Stream {
   std::string output = "RGBx";
   int width = 64, height = 48;
 
+  bool is_grey() const { return mosaic.starts_with("GRAY"); }
   std::string sink_caps() const {
-    return "video/x-bayer, format=" + mosaic + ", width=" + std::to_string(width) +
-           ", height=" + std::to_string(height) + ", framerate=30/1";
+    return (is_grey() ? "video/x-raw, format=" : "video/x-bayer, format=") + mosaic +
+           ", width=" + std::to_string(width) + ", height=" + std::to_string(height) + ", framerate=30/1";
   }
   std::string source_caps() const {
     if (output == "mosaic") return "video/x-bayer, format=" + mosaic.substr(0, 4) + "16le";
     return "video/x-raw, format=" + output;
   }
-  BayerCaps in() const {
+  InputCaps in() const {
     GstCaps* caps = gst_caps_from_string(sink_caps().c_str());
-    const std::optional<BayerCaps> read = read_bayer_caps(caps);
+    const std::optional<InputCaps> read = read_input_caps(caps);
     gst_caps_unref(caps);
     EXPECT_TRUE(read) << sink_caps();
-    return read.value_or(BayerCaps{});
+    return read.value_or(InputCaps{});
   }
 };
 
 Bytes frame_of(const Stream& stream, std::uint32_t seed) {
-  const BayerCaps in = stream.in();
+  const InputCaps in = stream.in();
   const std::optional<RawFormat> format = raw_format_of_v4l2(in.fourcc);
   const auto bytes = stage_testing::packed_frame(
       *format, stage_testing::scene(*format, stream.width, stream.height, seed), stream.width, in.stride);
@@ -87,7 +88,7 @@ class Reference {
     stage_.reset(stage);
   }
   void configure(const Stream& stream, const OutputCaps& output) {
-    const BayerCaps caps = stream.in();
+    const InputCaps caps = stream.in();
     stride_ = caps.stride;
     lowlux_stage_input in{};
     in.size = sizeof in;
@@ -181,6 +182,7 @@ Stream drawn(std::mt19937& random) {
   stream.mosaic = pick(orders);
   stream.mosaic += pick(depths);
   stream.output = pick(outputs);
+  if (stream.output != "mosaic" && random() % 4 == 0) stream.mosaic = random() % 2 == 0 ? "GRAY8" : "GRAY16_LE";
   stream.width = side();
   stream.height = side();
   return stream;
@@ -208,9 +210,10 @@ TEST(LowluxIsp, GivesTheBytesOfTheStage) {
 
 TEST(LowluxIsp, FollowsCapsThatChange) {
   const Stream first, second{.mosaic = "gbrg16le", .width = 50, .height = 70};
+  const Stream third{.mosaic = "GRAY16_LE", .width = 51, .height = 33};
   const Harness harness = harness_of(first);
   Reference reference(false);
-  for (const Stream& stream : {first, second, first}) {
+  for (const Stream& stream : {first, second, third, first}) {
     gst_harness_set_src_caps_str(harness.get(), stream.sink_caps().c_str());
     const Bytes bytes = frame_of(stream, 5);
     GstBuffer* image = gst_harness_push_and_pull(harness.get(), buffer_of(bytes, 0));
@@ -225,7 +228,7 @@ TEST(LowluxIsp, FollowsCapsThatChange) {
 TEST(LowluxIsp, ReadsRowsAsTheirMetadataStatesThem) {
   const Stream stream;
   const Harness harness = harness_of(stream);
-  const BayerCaps in = stream.in();
+  const InputCaps in = stream.in();
   const Bytes bytes = frame_of(stream, 3);
   const gsize offset = 32, stride = in.stride + 24;
   Bytes padded(offset + stride * static_cast<gsize>(in.height), 0xA5);
@@ -247,10 +250,20 @@ TEST(LowluxIsp, ReadsRowsAsTheirMetadataStatesThem) {
 
 TEST(LowluxIsp, RowsAreThoseOfGstreamersElementsOrOfDrivers) {
   const Stream stream{.width = 50};  // rows of 100 bytes, padded to 52 pixels
-  const BayerCaps in = stream.in();
+  const InputCaps in = stream.in();
   ASSERT_EQ(in.stride, 104U);
   const Stream bytewise{.mosaic = "rggb", .width = 50};
   EXPECT_EQ(bytewise.in().stride, 52U);
+  for (const char* const format : {"GRAY8", "GRAY16_LE"}) {
+    for (const int width : {48, 49, 50, 51}) {
+      const Stream grey{.mosaic = format, .width = width};
+      GstCaps* caps = gst_caps_from_string(grey.sink_caps().c_str());
+      GstVideoInfo info;
+      ASSERT_NE(gst_video_info_from_caps(&info, caps), FALSE);
+      gst_caps_unref(caps);
+      EXPECT_EQ(grey.in().stride, static_cast<std::size_t>(GST_VIDEO_INFO_PLANE_STRIDE(&info, 0))) << format << width;
+    }
+  }
   const Bytes bytes = frame_of(stream, 3);
   Bytes tight;
   for (int y = 0; y < in.height; ++y) {
@@ -382,12 +395,23 @@ TEST(LowluxIsp, RefusesCapsThatSayTooLittle) {
     GstPad* sink = gst_element_get_static_pad(harness->element, "sink");
     GstCaps* refused = gst_caps_from_string(caps);
     EXPECT_EQ(gst_pad_query_accept_caps(sink, refused) != FALSE && gst_caps_is_fixed(refused) != FALSE &&
-                  read_bayer_caps(refused).has_value(),
+                  read_input_caps(refused).has_value(),
               false)
         << caps;
     gst_caps_unref(refused);
     gst_object_unref(sink);
   }
+}
+
+TEST(LowluxIsp, MonochromeFramesHaveNoMosaicToOutput) {
+  GstCaps* sink = gst_caps_from_string("video/x-raw, format=GRAY8, width=64, height=48, framerate=30/1");
+  GstCaps* source = other_caps(GST_PAD_SINK, sink);
+  GstCaps* mosaic = gst_caps_from_string("video/x-bayer");
+  GstCaps* picture = gst_caps_from_string("video/x-raw, format=NV12");
+  EXPECT_EQ(gst_caps_can_intersect(source, mosaic), FALSE);
+  EXPECT_NE(gst_caps_can_intersect(source, picture), FALSE);
+  EXPECT_FALSE(read_output_caps(sink));
+  for (GstCaps* const caps : {sink, source, mosaic, picture}) gst_caps_unref(caps);
 }
 
 TEST(LowluxIsp, DoesNotStartWithoutItsProfile) {
@@ -439,7 +463,7 @@ TEST(LowluxIsp, PostsWhatWasDoneWhereAsked) {
 TEST(LowluxIsp, TakesPixelsAtTheWhiteLevelForSaturated) {
   Stream stream;
   stream.output = "RGB";
-  const BayerCaps caps = stream.in();
+  const InputCaps caps = stream.in();
   Bytes bytes(caps.stride * static_cast<std::size_t>(stream.height));
   for (std::size_t i = 0; i < bytes.size(); i += 2) {  // 700 of 1023
     bytes[i] = 700 & 255;
