@@ -97,7 +97,7 @@ TEST(Denoiser, TakesOneScaleOfAllLevelsForThatOfTheNoise) {
         return out;
       }()
           .view(),
-      1e-3, "one scale for all");  // [e-]: float, values of 100; a coefficient on its threshold would be 2
+      1e-3, 0, "one scale for all");  // [e-]: float, values of 100; a coefficient on its threshold would be 2
 }
 
 TEST(Denoiser, AgreesWithTheReferenceWhereSitesAreSaturated) {
