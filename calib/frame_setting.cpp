@@ -59,9 +59,9 @@ bool same_temperature(const std::optional<double>& first_c, const std::optional<
 }
 
 Result<void> check_same_camera(const FrameSetting& first, const FrameSetting& second, const std::string& what) {
-  const std::string camera = camera_name(first.make, first.model), other = camera_name(second.make, second.model);
-  if (camera.empty() != other.empty() || !is_same_camera({first.make, first.model}, {second.make, second.model})) {
-    return differs(what, fmt::format("is of camera \"{}\"", other), fmt::format("of \"{}\"", camera));
+  if (!is_same_camera({first.make, first.model}, {second.make, second.model})) {
+    return differs(what, fmt::format("is of camera \"{}\"", camera_name(second.make, second.model)),
+                   fmt::format("of \"{}\"", camera_name(first.make, first.model)));
   }
   if (first.width != second.width || first.height != second.height) {
     return differs(what, fmt::format("has {} x {} pixels", second.width, second.height),

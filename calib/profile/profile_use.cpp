@@ -22,7 +22,7 @@ constexpr double same_exposure = 0.01;    // relative
 constexpr double telling_charge_e = 0.2;  // smaller dark charge does not change a black point measurably
 
 Result<void> check_camera(const CameraProfile& profile, const FrameInfo& info) {
-  if (is_same_camera({profile.make, profile.model}, {info.make, info.model})) return {};
+  if (may_be_same_camera({profile.make, profile.model}, {info.make, info.model})) return {};
   return fail(ErrorCode::invalid_argument,
               fmt::format(R"(the profile is of "{}", the frame of "{}")", camera_name(profile.make, profile.model),
                           camera_name(info.make, info.model)));

@@ -1,6 +1,7 @@
 #include "isp/base/camera_profile.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -26,7 +27,7 @@ std::string lower_case(std::string_view text) {
 std::string model_key(std::string_view model) {
   constexpr std::string_view ending = " digital camera";
   std::string out = lower_case(model);
-  if (out.ends_with(ending)) out.erase(out.size() - ending.size());
+  if (out.size() > ending.size() && out.ends_with(ending)) out.erase(out.size() - ending.size());
   return out;
 }
 
@@ -44,14 +45,21 @@ std::string camera_name(std::string_view make, std::string_view model) {
 }
 
 bool is_same_camera(const CameraName& one, const CameraName& other) {
+  constexpr std::size_t longest = 256;  // makes are searched in each other
+  const std::size_t length = std::max({one.make.size(), one.model.size(), other.make.size(), other.model.size()});
+  if (length > longest) return one.make == other.make && one.model == other.model;
+  if (one.make.empty() != other.make.empty() || one.model.empty() != other.model.empty()) return false;
   const std::string make_a = lower_case(one.make), make_b = lower_case(other.make);
   const std::string model_a = model_key(one.model), model_b = model_key(other.model);
-  const bool makes_agree = make_a.empty() || make_b.empty() || make_a.find(make_b) != std::string::npos ||
-                           make_b.find(make_a) != std::string::npos || model_a.starts_with(make_b) ||
-                           model_b.starts_with(make_a);
-  const bool models_agree =
-      model_a.empty() || model_b.empty() || ends_with_words(model_a, model_b) || ends_with_words(model_b, model_a);
-  return makes_agree && models_agree;
+  const bool makes_agree = make_a.find(make_b) != std::string::npos || make_b.find(make_a) != std::string::npos ||
+                           model_a.starts_with(make_b) || model_b.starts_with(make_a);
+  return makes_agree && (ends_with_words(model_a, model_b) || ends_with_words(model_b, model_a));
+}
+
+bool may_be_same_camera(const CameraName& one, const CameraName& other) {
+  const auto completed = [](std::string_view name, std::string_view by) { return name.empty() ? by : name; };
+  return is_same_camera({completed(one.make, other.make), completed(one.model, other.model)},
+                        {completed(other.make, one.make), completed(other.model, one.model)});
 }
 
 }  // namespace lowlux

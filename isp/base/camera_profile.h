@@ -97,11 +97,13 @@ struct CameraName {
   std::string_view model;
 };
 
-/// Returns whether two names may be those of one camera: an empty make or model agrees with every other. Decoders
-/// shorten the names of files: "Nikon" "D750" is "NIKON CORPORATION" "NIKON D750". Makes agree if one contains the
-/// other, or if a model begins with the make of the other ("PENTAX K-1" of "RICOH IMAGING COMPANY, LTD." is of
-/// "Pentax"); models, if one is the end of the other, from a word on; both in any case of letters, and without a
-/// "digital camera" at the end.
+/// Returns whether two frames name one camera. Decoders shorten the names of files: "Nikon" "D750" is "NIKON
+/// CORPORATION" "NIKON D750". Makes agree if one contains the other, or if a model begins with the make of the other
+/// ("PENTAX K-1" of "RICOH IMAGING COMPANY, LTD." is of "Pentax"); models, if one is the end of the other, from a word
+/// on; both in any case of letters, and without a "digital camera" at the end. A missing make or model agrees with a
+/// missing one alone. Names of more than 256 characters agree if they are equal.
 bool is_same_camera(const CameraName& one, const CameraName& other);
+/// Returns the same of names that may be incomplete, as those of profiles are: a missing make or model agrees with any.
+bool may_be_same_camera(const CameraName& one, const CameraName& other);
 
 }  // namespace lowlux

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <string>
 
 namespace lowlux {
 namespace {
@@ -42,11 +43,30 @@ TEST(CameraName, FilesAndDecodersNameTheSameCamera) {
       }
     }
   }
-  EXPECT_TRUE(is_same_camera({"Canon", "Canon EOS R"}, {}));
-  EXPECT_TRUE(is_same_camera({"Canon", ""}, {"Canon", "EOS R"}));
   EXPECT_FALSE(is_same_camera({"Canon", "Canon EOS R"}, {"Canon", "EOS R5"}));
   EXPECT_FALSE(is_same_camera({"Canon", "Canon EOS 5D"}, {"Canon", "D"}));
   EXPECT_FALSE(is_same_camera({"Acme", "One"}, {"Other", "One"}));
+}
+
+TEST(CameraName, MissingNamesAgreeWithAnyWhereNamesMayBeIncomplete) {
+  const CameraName full{"Canon", "EOS R"};
+  EXPECT_TRUE(is_same_camera({}, {}));
+  for (const CameraName& part : {CameraName{}, CameraName{"Canon", ""}, CameraName{"", "Canon EOS R"}}) {
+    EXPECT_FALSE(is_same_camera(part, full)) << part.make << part.model;
+    EXPECT_FALSE(is_same_camera(full, part)) << part.make << part.model;
+    EXPECT_TRUE(may_be_same_camera(part, full)) << part.make << part.model;
+    EXPECT_TRUE(may_be_same_camera(full, part)) << part.make << part.model;
+  }
+  EXPECT_FALSE(may_be_same_camera({"Nikon", ""}, full));
+  EXPECT_FALSE(may_be_same_camera({"", "EOS R5"}, full));
+  EXPECT_FALSE(is_same_camera({"Acme", " digital camera"}, full));
+}
+
+// Searching one in the other would take days.
+TEST(CameraName, NamesOfMegabytesAreComparedAtOnce) {
+  const std::string make(8'000'000, 'a'), other = std::string(4'000'000, 'a') + 'b';
+  EXPECT_FALSE(is_same_camera({make, "One"}, {other, "One"}));
+  EXPECT_TRUE(is_same_camera({make, "One"}, {make, "One"}));
 }
 
 }  // namespace

@@ -25,15 +25,16 @@ bool differ(const std::optional<double>& a, const std::optional<double>& b) {
   return std::fabs(*a - *b) > 1e-3 * std::max(std::fabs(*a), std::fabs(*b));
 }
 
-std::string camera_of(const FrameInfo& info) { return camera_name(info.make, info.model); }
+std::string camera_of(const FrameInfo& info) {
+  const std::string name = camera_name(info.make, info.model);
+  return name.empty() ? "an unnamed camera" : name;
+}
 CameraName name_of(const FrameInfo& info) { return {info.make, info.model}; }
 
 /// Returns why a frame cannot be merged with the reference; nullopt if it can.
 std::optional<std::string> difference_to(const RawDn& reference, const RawDn& frame) {
-  const std::string expected = camera_of(reference.info), camera = camera_of(frame.info);
-  if (expected.empty() != camera.empty() || !is_same_camera(name_of(reference.info), name_of(frame.info))) {
-    const auto named = [](const std::string& name) { return name.empty() ? "an unnamed camera" : name; };
-    return fmt::format("it was taken with {}, the reference with {}", named(camera), named(expected));
+  if (!is_same_camera(name_of(reference.info), name_of(frame.info))) {
+    return fmt::format("it was taken with {}, the reference with {}", camera_of(frame.info), camera_of(reference.info));
   }
   if (reference.layout != frame.layout || reference.phase != frame.phase) {
     return "its mosaic is not that of the reference";
@@ -202,7 +203,9 @@ Result<int> FrameLoader::brightest(int count) {
     if (!raw.info.exposure_s) return 0;
     surveyed.push_back({raw.info.iso, saturation_of(*read)});
     const double light = *raw.info.exposure_s / std::pow(raw.info.f_number.value_or(1), 2);
-    if (light <= most_light || saturated_share(raw, surveyed.back().level) > most_saturated) continue;
+    const bool is_brighter = light > most_light && saturated_share(raw, surveyed.back().level) <= most_saturated;
+    clock_.lap("black and noise");
+    if (!is_brighter) continue;
     found = index;
     most_light = light;
   }
