@@ -83,7 +83,8 @@ Result<void> merge_moved(MergeContext& work, std::map<int, merge::Motion> motion
 /// it was named: where frames do not match, its noise is that of the result.
 Result<void> begin_bracket(MergeContext& work) {
   work.out.bracket = true;
-  if (work.options.reference && work.out.saturation) return {};
+  const bool is_known = work.out.saturation || !work.loader.reference_options().find_saturation;
+  if (work.options.reference && is_known) return {};
   Result<int> brightest = work.loader.brightest(work.count);
   if (!brightest) return tl::make_unexpected(brightest.error());
   if (!work.options.reference) work.out.reference = *brightest;
