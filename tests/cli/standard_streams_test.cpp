@@ -76,6 +76,7 @@ TEST_F(StandardStreams, RefuseWhatCannotBeInOneLine) {
   for (const auto& [line, code, why] : {std::tuple{"develop - - -o " + quoted("out/"), 2, "given twice"},
                                         {"develop " + raw + " -o - --json", 2, "standard output holds the file"},
                                         {"develop " + raw + " -o - --json --nonsense", 2, "unknown option"},
+                                        {"develop " + raw + " -o- --json --nonsense", 2, "unknown option"},
                                         {"develop " + raw + " --output=- --json --jobs 0", 2, "--jobs"},
                                         {"develop " + raw + " -o - --explain", 2, "standard output holds the file"},
                                         {"denoise " + raw + " -o - --timings", 2, "standard output holds the file"},

@@ -124,10 +124,11 @@ int run_calibrate(const std::vector<std::string>& words) {
   }
   std::array<std::string_view, kinds.size()> names;
   std::ranges::transform(kinds, names.begin(), &Kind::name);
-  const bool is_unnamed = first.empty() || first == "--json";
+  const bool is_unnamed = first.empty() || first.starts_with('-');
   const std::string wrong =
-      is_unnamed ? fmt::format("name what to calibrate: {}; --help describes them", fmt::join(names, ", "))
-                 : fmt::format("unknown kind '{}'{}; --help lists them", first, suggestion(first, names));
+      is_unnamed
+          ? fmt::format("name what to calibrate: {}, before any option; --help describes them", fmt::join(names, ", "))
+          : fmt::format("unknown kind '{}'{}; --help lists them", first, suggestion(first, names));
   return print_usage_error("calibrate", {ErrorCode::invalid_argument, wrong, {}}, failure_json("calibrate", words));
 }
 

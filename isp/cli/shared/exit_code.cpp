@@ -24,7 +24,9 @@ FailureJson failure_json(std::string_view verb, const std::vector<std::string>& 
     const std::string_view letter = flag.substr(1, 2);  // "-o" of "--output"
     for (auto word = words.begin(); word != end; ++word) {
       const bool is_next = word + 1 != end && word[1] == value && (*word == flag || *word == letter);
-      if (is_next || *word == fmt::format("{}={}", flag, value)) return true;
+      const bool is_attached =
+          *word == fmt::format("{}={}", flag, value) || *word == fmt::format("{}{}", letter, value);
+      if (is_next || is_attached) return true;
     }
     return false;
   });

@@ -339,6 +339,7 @@ TEST_F(Calibrate, WrongCommandLinesAreSaid) {
     EXPECT_TRUE(holds(done.err, why)) << done.err;
   };
   usage({"calibrate"}, "name what to calibrate: black, colour, noise, quoted, sheet");
+  usage({"calibrate", "--json", "black"}, "sheet, before any option");
   usage({"calibrate", "grey"}, "unknown kind 'grey'");
   usage({"calibrate", "black", "-o", file("p.json")}, "FRAMES");
   usage({"calibrate", "black", "a.dng"}, "--output");
