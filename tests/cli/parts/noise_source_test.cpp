@@ -181,6 +181,7 @@ TEST_F(NoiseSourceOrder, StatesAnUncertaintyThatCoversSensorsOutsideTheirClass) 
   for (const bool is_outside : {false, true}) {
     double within_one = 0, within_two = 0, count = 0;
     for (std::uint64_t seed = 1; count < sensors; ++seed) {
+      ASSERT_LE(seed, std::uint64_t{20} * sensors) << "images show the noise of nearly all sensors";
       const double iso = log_uniform(100, 6400), class_electrons = 100 / iso * calib::large_sensor_e;
       const double outside = engine() % 2 == 0 ? log_uniform(4, 16) : 1 / log_uniform(4, 16);
       const double ratio = is_outside ? outside : std::exp(std::log(calib::large_sensor_factor) * normal(engine));
