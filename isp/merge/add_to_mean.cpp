@@ -84,4 +84,27 @@ std::array<double, 3> add_drops(PlaneView<const float> differences, BayerPhase p
   return weights.square;
 }
 
+void add_colour_drops(PlaneView<const float> differences, BayerPhase phase, const Motion& motion,
+                      const RgbView<const float>& prediction, PlaneView<const std::uint8_t> block_matches,
+                      ColourMean& mean, Executor& executor) {
+  for_each_band(executor, differences.height, [&](RowBand band, int) {
+    ColourDropRows rows(differences, phase, motion, prediction);
+    for (int y = band.first; y < band.last; ++y) {
+      const ColourDropRows::Row& row = rows.row(y);
+      ColourRowSums sums;
+      for (std::size_t c = 0; c < 3; ++c) {
+        sums.value[c] = row.value[c].data();
+        sums.weight[c] = row.weight[c].data();
+      }
+      mean.add_row(y, sums, block_matches);
+    }
+  });
+}
+
+std::array<ColourDensity, 3> colour_drop_density() {
+  constexpr float green_px = ColourDropRows::green_px, red_blue_px = ColourDropRows::red_blue_px;
+  const ColourDensity red_blue{0.25F, red_blue_px * red_blue_px / 4};
+  return {red_blue, {0.5F, green_px * green_px / 2}, red_blue};
+}
+
 }  // namespace lowlux::merge

@@ -31,4 +31,13 @@ std::array<double, 3> add_drops(PlaneView<const float> differences, BayerPhase p
                                 const RgbView<const float>& prediction, double radius_px, const MeanPart& part,
                                 MosaicMean& mean, Executor& executor);
 
+/// Adds differences as drops of all three colours of each pixel (ColourDropRows).
+/// @param prediction  that the differences were formed with
+void add_colour_drops(PlaneView<const float> differences, BayerPhase phase, const Motion& motion,
+                      const RgbView<const float>& prediction, PlaneView<const std::uint8_t> block_matches,
+                      ColourMean& mean, Executor& executor);
+
+/// Returns how densely add_colour_drops covers pixels, on average over all displacements: for R, G and B.
+std::array<ColourDensity, 3> colour_drop_density();
+
 }  // namespace lowlux::merge

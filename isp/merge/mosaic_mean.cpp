@@ -77,6 +77,26 @@ void add_run(const float* value, const WeightOf& weight_of, int first, int last,
   }
 }
 
+constexpr float weight_steps = 256;  // of the weights of ColourMean
+constexpr double least_ratio = 1.0 / 64;
+
+/// Returns the variance of pixels of a colour with a mean weight as it is seen in means of larger areas, over that of a
+/// sample: at most that of one frame. Each sample weighs as much as others there, whatever the weights of the pixels.
+/// @param weight  in steps, > 0
+double colour_variance(double weight, const ColourDensity& of) {
+  return std::min(1.0, weight_steps * of.mean_weight / weight) / of.samples_per_px;
+}
+
+double mean_of_block(const Plane<std::uint16_t>& plane, int column, int row) {
+  const int right = std::min((column + 1) * block_px, plane.width());
+  const int bottom = std::min((row + 1) * block_px, plane.height());
+  double sum = 0;
+  for (int y = row * block_px; y < bottom; ++y) {
+    for (int x = column * block_px; x < right; ++x) sum += plane.at(x, y);
+  }
+  return sum / (static_cast<double>(right - column * block_px) * (bottom - row * block_px));
+}
+
 }  // namespace
 
 void robust_mean(std::span<Plane<float>> mosaics, const MosaicNoise& noise, Executor& executor) {
@@ -100,13 +120,6 @@ void robust_mean(std::span<Plane<float>> mosaics, const MosaicNoise& noise, Exec
 
 MosaicMean::MosaicMean(int width, int height) : sum_(width, height), weight_(width, height) {
   for (Plane<float>* plane : {&sum_, &weight_}) std::fill_n(plane->data(), plane->size(), 0.0F);
-}
-
-MosaicMean MosaicMean::clone() const {
-  MosaicMean out(0, 0);
-  out.sum_ = sum_.clone();
-  out.weight_ = weight_.clone();
-  return out;
 }
 
 void MosaicMean::add_row(int y, const WeightedRow& row, PlaneView<const std::uint8_t> block_matches) {
@@ -139,6 +152,85 @@ Plane<float> MosaicMean::take_mean(Executor& executor) {
     }
   });
   return mean;
+}
+
+ColourMean::ColourMean(int width, int height, const std::array<ColourDensity, 3>& density) : density_(density) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    sum_[c] = Plane<float>(width, height);
+    weight_[c] = Plane<std::uint16_t>(width, height);
+    std::fill_n(sum_[c].data(), sum_[c].size(), 0.0F);
+    std::fill_n(weight_[c].data(), weight_[c].size(), std::uint16_t{0});
+  }
+}
+
+void ColourMean::add_row(int y, const ColourRowSums& row, PlaneView<const std::uint8_t> block_matches) {
+  for_matching(y, width(), block_matches, [&](int first, int last) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float *const value = row.value[c], *const more = row.weight[c];
+      float* const sum = sum_[c].row(y);
+      std::uint16_t* const weight = weight_[c].row(y);
+      for (int x = first; x < last; ++x) {
+        sum[x] += value[x];
+        weight[x] = static_cast<std::uint16_t>(weight[x] + static_cast<int>(weight_steps * more[x]));
+      }
+    }
+  });
+}
+
+std::array<double, 3> ColourMean::variance(Executor& executor) const {
+  std::array<double, 3> out{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const Plane<std::uint16_t>& plane = weight_[c];
+    /// The sum of the weights of pixels that have any, and their number.
+    struct Sum {
+      double weight = 0, pixels = 0;
+    };
+    std::vector<Sum> of_row(static_cast<std::size_t>(height()));
+    for_each_index(executor, height(), [&](int y) {
+      Sum& sum = of_row[static_cast<std::size_t>(y)];
+      for (int x = 0; x < width(); ++x) {
+        sum.weight += plane.at(x, y);
+        sum.pixels += plane.at(x, y) > 0 ? 1 : 0;
+      }
+    });
+    Sum all;
+    for (const Sum& sum : of_row) {
+      all.weight += sum.weight;
+      all.pixels += sum.pixels;
+    }
+    out[c] = colour_variance(all.pixels > 0 ? all.weight / all.pixels : 1, density_[c]);
+  }
+  return out;
+}
+
+ColourMean::Image ColourMean::image(const RowBand& rows, const std::array<double, 3>& variance,
+                                    const RgbView<const float>& prediction, Executor& executor) const {
+  assert(rows.first % block_px == 0 && (rows.last % block_px == 0 || rows.last == height()));
+  Image out{.samples = Plane<float>(3 * width(), rows.last - rows.first), .noise_ratio = {.block_px = block_px}};
+  for_each_index(executor, rows.last - rows.first, [&](int row) {
+    const int y = rows.first + row;
+    float* const samples = out.samples.row(row);
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (int x = 0; x < width(); ++x) {
+        const float weight = weight_[c].at(x, y);
+        samples[3 * static_cast<std::size_t>(x) + c] =
+            weight > 0 ? weight_steps * sum_[c].at(x, y) / weight : prediction[c].at(x, y);
+      }
+    }
+  });
+  Plane<float>& ratio = out.noise_ratio.ratio;
+  ratio = Plane<float>(ratio_blocks(width(), block_px), ratio_blocks(rows.last - rows.first, block_px));
+  for_each_index(executor, ratio.height(), [&](int row) {
+    for (int column = 0; column < ratio.width(); ++column) {
+      double sum = 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double weight = mean_of_block(weight_[c], column, rows.first / block_px + row);
+        if (weight > 0) sum += colour_variance(weight, density_[c]) / variance[c];
+      }
+      ratio.at(column, row) = static_cast<float>(std::max(sum / 3, least_ratio));
+    }
+  });
+  return out;
 }
 
 }  // namespace lowlux::merge

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
 #include "isp/base/executor.h"
+#include "isp/base/image.h"
+#include "isp/base/noise_ratio.h"
 #include "isp/base/plane.h"
 #include "isp/merge/block_test.h"
 
@@ -29,8 +32,6 @@ class MosaicMean {
  public:
   MosaicMean(int width, int height);
 
-  MosaicMean clone() const;
-
   /// Adds a row of a mosaic. Different rows may be added at the same time.
   /// @param block_matches  as in Comparison; without data all count
   void add_row(int y, const WeightedRow& row, PlaneView<const std::uint8_t> block_matches);
@@ -54,6 +55,54 @@ class MosaicMean {
  private:
   Plane<float> sum_;
   Plane<float> weight_;
+};
+
+/// Holds the weighted sums of a row of R, G and B.
+struct ColourRowSums {
+  std::array<const float*, 3> value{};   // sum t y
+  std::array<const float*, 3> weight{};  // sum t, in multiples of 1/256, at most 1
+};
+
+/// States how densely one frame covers the pixels with samples of a colour.
+struct ColourDensity {
+  float samples_per_px;
+  float mean_weight;  // of a pixel, ColourRowSums::weight
+};
+
+/// Adds frames at every pixel for each of three colours, and returns their mean: over frames that are displaced against
+/// each other, every pixel gets samples of each colour. Memory does not depend on their number: 18 bytes for each
+/// pixel.
+class ColourMean {
+ public:
+  static constexpr int max_frames = 255;  // whose weights the sums can hold
+
+  /// @param density  of the frames, for R, G and B
+  ColourMean(int width, int height, const std::array<ColourDensity, 3>& density);
+
+  int width() const { return sum_[0].width(); }
+  int height() const { return sum_[0].height(); }
+
+  /// Adds a row of a frame. Different rows may be added at the same time.
+  /// @param block_matches  as in Comparison; without data all count
+  void add_row(int y, const ColourRowSums& row, PlaneView<const std::uint8_t> block_matches);
+
+  /// Returns the variance of R, G, B over that of a sample, as it is seen in means of larger areas.
+  std::array<double, 3> variance(Executor& executor) const;
+
+  struct Image {
+    Plane<float> samples;    // R, G, B of each pixel, interleaved
+    NoiseRatio noise_ratio;  // of the variance of a block to variance()
+  };
+  /// Returns the mean of some rows. Values without samples are those of the prediction, whose noise counts as small.
+  /// @param rows      begin at a block, and end at one or at the last row
+  /// @param variance  variance()
+  Image image(const RowBand& rows, const std::array<double, 3>& variance, const RgbView<const float>& prediction,
+              Executor& executor) const;
+
+ private:
+  std::array<Plane<float>, 3> sum_;
+  std::array<Plane<std::uint16_t>, 3> weight_;  // in multiples of 1/256
+  std::array<ColourDensity, 3> density_;
 };
 
 }  // namespace lowlux::merge

@@ -132,4 +132,31 @@ const DropRows::Row& DropRows::row(int y) {
   return row_;
 }
 
+ColourDropRows::ColourDropRows(PlaneView<const float> differences, BayerPhase phase, const Motion& motion,
+                               const RgbView<const float>& prediction)
+    : differences_(differences),
+      phase_(phase),
+      motion_(motion),
+      prediction_(prediction),
+      dx_px_(static_cast<std::size_t>(differences.width)),
+      dy_px_(dx_px_.size()) {
+  row_.value.fill(dx_px_);
+  row_.weight.fill(dx_px_);
+}
+
+const ColourDropRows::Row& ColourDropRows::row(int y) {
+  rows::ColourRow out{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    out.value[c] = row_.value[c].data();
+    out.weight[c] = row_.weight[c].data();
+  }
+  rows::colour_row({samples_of(differences_), red_column(phase_), red_row(phase_)},
+                   displaced(motion_, y, dx_px_, dy_px_), {green_px, red_blue_px}, out);
+  for (std::size_t c = 0; c < 3; ++c) {
+    const float* const predicted = prediction_[c].row(y);
+    for (std::size_t x = 0; x < dx_px_.size(); ++x) out.value[c][x] += out.weight[c][x] * predicted[x];
+  }
+  return row_;
+}
+
 }  // namespace lowlux::merge

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "isp/base/executor.h"
@@ -20,7 +21,8 @@ namespace lowlux::merge {
 /// Computes the differences D of a frame to the prediction, at the frame's own sites.
 /// @param light        ratio of the frame's signal to that of the reference
 /// @param prediction   R, G, B of the reference at every pixel [e-]; three empty views: it is 0 everywhere
-/// @param differences  as large as the frame, in the light of the reference; NaN where the frame has no value
+/// @param differences  as large as the frame, in the light of the reference; NaN where the frame has no value. It may
+///                     be the memory of the frame's signal.
 void subtract_prediction(const FrameView& frame, double light, const Motion& motion,
                          const RgbView<const float>& prediction, PlaneView<float> differences, Executor& executor);
 
@@ -60,6 +62,32 @@ class DropRows {
   const Motion& motion_;
   RgbView<const float> prediction_;
   float radius_;
+  Row row_;
+  std::vector<float> dx_px_, dy_px_;
+};
+
+/// Places differences as drops for all three colours of each pixel, row by row. Drops are smaller than those of
+/// DropRows: over frames with different displacements each pixel gets samples of each colour.
+class ColourDropRows {
+ public:
+  static constexpr float green_px = 0.75F, red_blue_px = 0.9F;  // radii
+
+  /// Each argument as in DropRows.
+  ColourDropRows(PlaneView<const float> differences, BayerPhase phase, const Motion& motion,
+                 const RgbView<const float>& prediction);
+
+  /// Holds the values of a row of the reference, for R, G and B.
+  struct Row {
+    std::array<std::vector<float>, 3> value;   // sum t (P(p) + D)
+    std::array<std::vector<float>, 3> weight;  // sum t, in multiples of 1/256, at most 1
+  };
+  const Row& row(int y);
+
+ private:
+  PlaneView<const float> differences_;
+  BayerPhase phase_;
+  const Motion& motion_;
+  RgbView<const float> prediction_;
   Row row_;
   std::vector<float> dx_px_, dy_px_;
 };

@@ -279,12 +279,78 @@ void DropRow(const Mosaic& mosaic, const DisplacedRow& at, const DropRadius& rad
   });
 }
 
+/// The weights of the samples 0 and 1 along one axis.
+struct NearTents {
+  VF w[2];
+};
+
+HWY_INLINE NearTents near_tents(VF fraction, float radius) {
+  const Tents all = tents(fraction, constant(1 / radius));
+  return {{all.w[1], all.w[2]}};
+}
+
+/// Adds up weighted samples where they exist.
+HWY_INLINE DropSums add_sample(const DropSums& sums, VF d, VF tent) {
+  constexpr float steps = 256;
+  const VF t =
+      hn::IfThenElseZero(hn::Eq(d, d), hn::Mul(hn::Round(hn::Mul(tent, constant(steps))), constant(1 / steps)));
+  const VF known = hn::IfThenElseZero(hn::Eq(d, d), d);
+  return {hn::Add(sums.value, hn::Mul(t, known)), hn::Add(sums.weight, t)};
+}
+
+void ColourRowOf(const Mosaic& mosaic, const DisplacedRow& at, const ColourRadius& radius, const ColourRow& out) {
+  const Samples& samples = mosaic.samples;
+  const MI everywhere = hn::Eq(whole(0), whole(0));
+  for_pixels(at, [&](int x, VF dx, VF dy, int count) HWY_ATTR {
+    const Ints s32;
+    const VF floor_x = hn::Floor(dx), floor_y = hn::Floor(dy);
+    const VF fraction_x = hn::Sub(dx, floor_x), fraction_y = hn::Sub(dy, floor_y);
+    const NearTents green_across = near_tents(fraction_x, radius.green),
+                    green_down = near_tents(fraction_y, radius.green);
+    const NearTents across = near_tents(fraction_x, radius.red_blue), down = near_tents(fraction_y, radius.red_blue);
+    const DropSums none{hn::Zero(Floats()), hn::Zero(Floats())};
+    DropSums sums[3] = {none, none, none};
+    // Of the 2x2 samples around each place one is red, two are green and one is blue.
+    const auto add_group = [&](int first, int line, MI group) HWY_ATTR {
+      if (first + lanes() < -1 || first > samples.width || line < -2 || line > samples.height) return;
+      const int red_row = (line ^ mosaic.red_row) & 1;
+      const int red_column = (first ^ mosaic.red_column) & 1;  // at even lanes
+      const auto in_red_column = [=](const VF(&v)[2])
+                                     HWY_ATTR { return hn::OddEven(v[1 - red_column], v[red_column]); };
+      const auto beside = [=](const VF(&v)[2]) HWY_ATTR { return hn::OddEven(v[red_column], v[1 - red_column]); };
+      const bool inside = all_exist(samples, first, line, 0, 1);
+      const auto sample = [&](int i, int j) HWY_ATTR {
+        return inside ? load(samples.data + (line + j) * samples.stride + first + i)
+                      : existing(samples, first + i, line + j);
+      };
+      const VF red_line[2] = {sample(0, red_row), sample(1, red_row)};
+      const VF blue_line[2] = {sample(0, 1 - red_row), sample(1, 1 - red_row)};
+      const DropSums red = add_sample(none, in_red_column(red_line), hn::Mul(down.w[red_row], in_red_column(across.w)));
+      const DropSums blue = add_sample(none, beside(blue_line), hn::Mul(down.w[1 - red_row], beside(across.w)));
+      DropSums green = add_sample(none, beside(red_line), hn::Mul(green_down.w[red_row], beside(green_across.w)));
+      green = add_sample(green, in_red_column(blue_line),
+                         hn::Mul(green_down.w[1 - red_row], in_red_column(green_across.w)));
+      const DropSums found[3] = {red, green, blue};
+      for (int c = 0; c < 3; ++c) {
+        sums[c].value = hn::IfThenElse(of_floats(group), found[c].value, sums[c].value);
+        sums[c].weight = hn::IfThenElse(of_floats(group), found[c].weight, sums[c].weight);
+      }
+    };
+    for_groups(x, at.y, hn::ConvertTo(s32, floor_x), hn::ConvertTo(s32, floor_y), everywhere, add_group);
+    for (int c = 0; c < 3; ++c) {
+      store(sums[c].value, count, out.value[c] + x);
+      store(sums[c].weight, count, out.weight[c] + x);
+    }
+  });
+}
+
 }  // namespace lowlux::merge::rows::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace lowlux::merge::rows {
 
+HWY_EXPORT(ColourRowOf);
 HWY_EXPORT(DropRow);
 HWY_EXPORT(InterpolateRow);
 HWY_EXPORT(NearestRow);
@@ -297,6 +363,9 @@ void nearest_row(const Samples& samples, const DisplacedRow& at, float* out) {
 }
 void drop_row(const Mosaic& mosaic, const DisplacedRow& at, const DropRadius& radius, float* value, float* weight) {
   HWY_DYNAMIC_DISPATCH(DropRow)(mosaic, at, radius, value, weight);
+}
+void colour_row(const Mosaic& mosaic, const DisplacedRow& at, const ColourRadius& radius, const ColourRow& out) {
+  HWY_DYNAMIC_DISPATCH(ColourRowOf)(mosaic, at, radius, out);
 }
 
 }  // namespace lowlux::merge::rows

@@ -43,4 +43,21 @@ struct DropRadius {
 /// @param weight  sum t
 void drop_row(const Mosaic& mosaic, const DisplacedRow& at, const DropRadius& radius, float* value, float* weight);
 
+/// The radii of the drops of a colour, at most 1 pixel.
+struct ColourRadius {
+  float green;
+  float red_blue;
+};
+
+/// The sums of a row of pixels for R, G and B.
+struct ColourRow {
+  float* value[3];
+  float* weight[3];
+};
+
+/// Adds up the samples of each colour around the places of pixels, whatever the pixels' own colours are, weighted by
+/// the same tent, rounded to multiples of 1/256 so that sums of weights are exact. NaN samples do not count.
+/// @param out  sum t D and sum t
+void colour_row(const Mosaic& mosaic, const DisplacedRow& at, const ColourRadius& radius, const ColourRow& out);
+
 }  // namespace lowlux::merge::rows

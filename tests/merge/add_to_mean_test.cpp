@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstdio>
 #include <numbers>
 
 #include "tests/merge/merge_scene.h"
@@ -103,6 +105,98 @@ TEST(AddDrops, TheNoiseOfLargerAreasIsAsStated) {
         EXPECT_GE(stated[c], 1);
       }
     }
+  }
+}
+
+/// Returns a prediction that is linear in the place, so that interpolation is exact.
+RgbPlanes<struct PredictionDomain> linear_prediction(int width, int height, double slope) {
+  RgbPlanes<struct PredictionDomain> out;
+  for (std::size_t c = 0; c < 3; ++c) {
+    out.plane[c] = Plane<float>(width, height);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        out.plane[c].at(x, y) = static_cast<float>(20.0 * static_cast<double>(c + 1) + slope * (x - 0.5 * y));
+      }
+    }
+  }
+  return out;
+}
+
+// Frames turned by up to 0.05 cover the pixels with samples of each colour.
+TEST(AddColourDrops, TheMeanOfAllColoursIsTheSceneWithTheStatedNoise) {
+  constexpr int side = 320, border = 48, frames = 40;
+  const Plane<float> dark = test::flat_mosaic(side, side, 0);
+  const auto prediction = linear_prediction(side, side, 0.25);
+  ColourMean mean(side, side, colour_drop_density());
+  for (int i = 0; i < frames; ++i) {
+    const Plane<float> noise = test::noisy_frame(dark, 0, 1, 5, i);
+    add_colour_drops(noise.view(), BayerPhase::gbrg, turned(side, side, 1.3e-3 * (i - 20), 0.37 * i, -0.61 * i),
+                     prediction.view(), {}, mean, test::one_thread);
+  }
+  const std::array<double, 3> variance = mean.variance(test::one_thread);
+  const ColourMean::Image image = mean.image({0, side}, variance, prediction.view(), test::one_thread);
+  for (std::size_t c = 0; c < 3; ++c) {
+    double sum = 0, squares = 0;
+    int windows = 0;
+    for (int top = border; top + 16 <= side - border; top += 16) {
+      for (int left = border; left + 16 <= side - border; left += 16) {
+        double of_window = 0;
+        for (int y = top; y < top + 16; ++y) {
+          for (int x = left; x < left + 16; ++x) {
+            of_window +=
+                static_cast<double>(image.samples.at(3 * x + static_cast<int>(c), y) - prediction.plane[c].at(x, y));
+          }
+        }
+        sum += of_window;
+        squares += of_window * of_window;
+        ++windows;
+      }
+    }
+    const double stated = variance[c] * image.noise_ratio.ratio.at(20, 20);
+    const double found = squares / windows / 256;
+    std::printf("colour %zu: variance stated %.4f, over that found %.3f\n", c, stated, stated / found);
+    // The variance of a variance of so many windows is 2 / n; windows share samples at their edges, 4 standard errors.
+    EXPECT_NEAR(found / stated, 1, 4 * std::sqrt(2.0 / windows) + 0.05) << c;
+    EXPECT_NEAR(sum / windows / 256, 0, 5 * std::sqrt(stated / (256.0 * windows))) << c;
+  }
+}
+
+TEST(AddColourDrops, BlocksWithoutFramesKeepThePrediction) {
+  constexpr int width = 61, height = 37;
+  const auto prediction = linear_prediction(width, height, 0.25);
+  const Plane<float> ones = [&] {
+    Plane<float> out(width, height);
+    std::fill_n(out.data(), out.size(), 1.0F);
+    return out;
+  }();
+  Plane<std::uint8_t> matches((width + block_px - 1) / block_px, (height + block_px - 1) / block_px);
+  std::fill_n(matches.data(), matches.size(), std::uint8_t{1});
+  matches.at(2, 1) = 0;
+  ColourMean mean(width, height, colour_drop_density());
+  for (int i = 0; i < 60; ++i) {
+    add_colour_drops(ones.view(), BayerPhase::rggb, turned(width, height, 0, 0.31 * i - 9, 0.23 * i - 7),
+                     prediction.view(), matches.view(), mean, test::one_thread);
+  }
+  const std::array<double, 3> variance = mean.variance(test::one_thread);
+  const ColourMean::Image all = mean.image({0, height}, variance, prediction.view(), test::one_thread);
+  for (int y = 1; y < height - 1; ++y) {  // border pixels have samples of fewer colours
+    for (int x = 1; x < width - 1; ++x) {
+      const bool is_left_out = x / block_px == 2 && y / block_px == 1;
+      for (int c = 0; c < 3; ++c) {
+        const float more = all.samples.at(3 * x + c, y) - prediction.plane[static_cast<std::size_t>(c)].at(x, y);
+        EXPECT_NEAR(static_cast<double>(more), is_left_out ? 0 : 1, 1e-4) << x << ' ' << y << ' ' << c;
+      }
+    }
+  }
+  EXPECT_EQ(all.noise_ratio.ratio.at(2, 1), 1.0F / 64);
+  EXPECT_GT(all.noise_ratio.ratio.at(3, 1), 0.3F);
+  // A strip of rows holds the same values.
+  const ColourMean::Image strip = mean.image({16, height}, variance, prediction.view(), test::one_thread);
+  for (int y = 16; y < height; ++y) {
+    for (int x = 0; x < 3 * width; ++x) ASSERT_EQ(strip.samples.at(x, y - 16), all.samples.at(x, y));
+  }
+  for (int i = 0; i < all.noise_ratio.ratio.width(); ++i) {
+    EXPECT_EQ(strip.noise_ratio.ratio.at(i, 0), all.noise_ratio.ratio.at(i, 2));
   }
 }
 

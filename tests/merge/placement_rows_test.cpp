@@ -166,5 +166,47 @@ TEST(PlacementRows, DropsAreSumsOverTheirColour) {
   });
 }
 
+TEST(PlacementRows, EveryPixelGetsTheSumsOfEachColour) {
+  std::array<int, 3> hits{};
+  for_cases([&](const Case& of) {
+    const int red_column = of.width & 1, red_row = of.height & 1;
+    const auto colour = [&](int x, int y) { return ((x ^ red_column) & 1) + ((y ^ red_row) & 1); };
+    for (const ColourRadius& radius : {ColourRadius{0.75F, 0.9F}, {1, 1}, {0.5F, 0.6F}}) {
+      std::array<std::vector<float>, 3> value, weight;
+      ColourRow out{};
+      for (std::size_t c = 0; c < 3; ++c) {
+        value[c].resize(of.dx.size());
+        weight[c].resize(of.dx.size());
+        out.value[c] = value[c].data();
+        out.weight[c] = weight[c].data();
+      }
+      colour_row({of.samples(of.with_gaps), red_column, red_row}, of.row(), radius, out);
+      for (int x = 0; x < of.width; ++x) {
+        std::array<double, 3> sum{}, weights{};
+        for (int v = 0; v < of.height; ++v) {
+          for (int u = 0; u < of.width; ++u) {
+            const auto c = static_cast<std::size_t>(colour(u, v));
+            const double px = static_cast<double>(c == 1 ? radius.green : radius.red_blue);
+            const double tx = 1 - std::abs(u - x - static_cast<double>(of.dx[x])) / px;
+            const double ty = 1 - std::abs(v - of.y - static_cast<double>(of.dy[x])) / px;
+            if (!(tx > 0) || !(ty > 0) || std::isnan(of.at(of.with_gaps, u, v))) continue;
+            sum[c] += tx * ty * of.at(of.with_gaps, u, v);
+            weights[c] += tx * ty;
+          }
+        }
+        for (std::size_t c = 0; c < 3; ++c) {
+          // At most two samples, of up to 1000, whose weights are rounded by half a step.
+          const double rounding = (c == 1 ? 2 : 1) * 0.501 / 256;
+          EXPECT_NEAR(static_cast<double>(weight[c][x]), weights[c], rounding) << x << ", colour " << c;
+          EXPECT_NEAR(static_cast<double>(value[c][x]), sum[c], 1000 * rounding) << x << ", colour " << c;
+          EXPECT_EQ(std::fmod(256 * weight[c][x], 1.0F), 0) << x << ", colour " << c;
+          hits[c] += weight[c][x] > 0 ? 1 : 0;
+        }
+      }
+    }
+  });
+  for (const int count : hits) EXPECT_GT(count, 5000);
+}
+
 }  // namespace
 }  // namespace lowlux::merge::rows

@@ -14,25 +14,6 @@
 namespace lowlux::isp {
 namespace {
 
-/// Holds the levels and noise of the reference for R, G and B.
-struct ColourLevels {
-  PerSite<double> white_e{};  // at 0, 1, 2
-  std::array<double, 3> variance_e2{};
-};
-
-ColourLevels levels_of(const FrameElectrons& reference) {
-  ColourLevels out;
-  for (int site = 0; site < 4; ++site) {
-    const auto colour = static_cast<std::size_t>(colour_at(reference.phase, site & 1, site >> 1));
-    const double share = colour == 1 ? 0.5 : 1,
-                 variance = reference.variance_e2[site] + reference.common_variance_e2[site];
-    out.white_e[colour] += share * reference.light_at_white_e[site];
-    out.variance_e2[colour] += share * variance;
-  }
-  out.white_e[3] = out.white_e[2];
-  return out;
-}
-
 /// Interleaves the colours of an image as R G B, pixels without data from the prediction.
 Plane<float> interleaved(const merge::DrizzleImage& image, const CameraRgb& prediction, Executor& executor) {
   Plane<float> out(3 * image.width, image.height);
@@ -149,7 +130,7 @@ Result<void> check_drizzle_memory(int width, int height, const merge::DrizzleOpt
 
 void encode_drizzled(merge::DrizzleImage& image, const merge::DrizzleOptions& options, const CameraRgb& prediction,
                      const FrameElectrons& reference, RawFrame& frame, MergedRaw& out, Executor& executor) {
-  const ColourLevels colours = levels_of(reference);
+  const ColourLevels colours = colour_levels(reference);
   out.frame.noise = profile_of(image, options, colours, out, executor);
   out.frame.noise->source = frame.noise->source;
   out.empty_fraction = image.empty_fraction;

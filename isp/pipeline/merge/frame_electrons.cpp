@@ -39,6 +39,18 @@ void describe_noise(const RawFrame& frame, const DevelopPlan& plan, FrameElectro
 
 }  // namespace
 
+ColourLevels colour_levels(const FrameElectrons& frame) {
+  ColourLevels out;
+  for (int site = 0; site < 4; ++site) {
+    const auto colour = static_cast<std::size_t>(colour_at(frame.phase, site & 1, site >> 1));
+    const double share = colour == 1 ? 0.5 : 1;
+    out.white_e[colour] += share * frame.light_at_white_e[site];
+    out.variance_e2[colour] += share * (frame.variance_e2[site] + frame.common_variance_e2[site]);
+  }
+  out.white_e[3] = out.white_e[2];
+  return out;
+}
+
 DevelopOptions options_of_signal(const DevelopOptions& options, denoise::Level level) {
   DevelopOptions out{.exposure_ev = 0,
                      .tone = ToneCurve::none,

@@ -35,6 +35,13 @@ inline merge::FrameView view_of(const FrameElectrons& frame) {
   return {frame.signal_e.view(), frame.phase, frame.variance_e2};
 }
 
+/// Holds the levels and the noise of a frame for R, G and B, of which both greens are the mean.
+struct ColourLevels {
+  PerSite<double> white_e{};            // light at white, at 0, 1, 2; the last figure is that of B
+  std::array<double, 3> variance_e2{};  // without light, that of the dark frame included
+};
+ColourLevels colour_levels(const FrameElectrons& frame);
+
 /// Returns options under which a whole frame is developed to camera RGB at a level. Of `options`, those of black level,
 /// dark charge, defects, line noise and interpolation are kept; those of the image, such as its crop, are not.
 DevelopOptions options_of_signal(const DevelopOptions& options, denoise::Level level);

@@ -9,7 +9,10 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int motion_frames = 2;  // in which the motion of the camera is measured
+constexpr int first_mean = 8;              // frames, of which the reference is predicted first
+constexpr double colours_share = 0.4;      // of the time of placing a frame: adding it to the mean of all colours
+constexpr double colour_prediction = 4.5;  // times the first prediction: developing all colours at every pixel
+constexpr int motion_frames = 2;           // in which the motion of the camera is measured
 
 bool is_static(MergeAlignment alignment) { return alignment == MergeAlignment::none; }
 
@@ -36,10 +39,17 @@ std::vector<MergeMethod> open_methods(const MergeWork& work, bool moved) {
   return out;
 }
 
-/// Returns how many times a sub-pixel merge predicts the reference.
-int predictions_of(int frames) {
-  int out = 1;
+/// Returns how many times a sub-pixel merge predicts the reference from a mean.
+int predictions_of_mean(int frames) {
+  int out = 0;
   for (int averaged = 2; averaged < frames; ++averaged) out += predicts_again(averaged, frames) ? 1 : 0;
+  return out;
+}
+
+/// Returns how many frames are added to the mean of all colours from which it does.
+int frames_of_colours(int frames) {
+  int out = 0;
+  while (will_predict_again(out + 1, frames)) ++out;
   return out;
 }
 
@@ -67,8 +77,11 @@ void state_better(const CostModel& cost, const MergeWork& work, const std::vecto
 }  // namespace
 
 bool predicts_again(int averaged, int frames) {
-  constexpr int first = 8;
-  return averaged >= first && std::has_single_bit(static_cast<unsigned>(averaged)) && averaged <= frames / 2;
+  return averaged >= first_mean && std::has_single_bit(static_cast<unsigned>(averaged)) && averaged <= frames / 2;
+}
+
+bool will_predict_again(int averaged, int frames) {
+  return std::bit_floor(static_cast<unsigned>(frames / 2)) > static_cast<unsigned>(std::max(averaged, first_mean - 1));
 }
 
 double predicted_merge_s(const CostModel& cost, const MergeWork& work, const MergeMethod& method,
@@ -92,8 +105,12 @@ double predicted_merge_s(const CostModel& cost, const MergeWork& work, const Mer
   add(CostPart::merge_alignment, n - 1);
   if (compares) add(CostPart::merge_comparison, n - 1);
   const bool cells = method.alignment == MergeAlignment::cells;
-  add(cells ? CostPart::merge_cells : CostPart::merge_subpixel, n - 1);
-  if (!cells) add(CostPart::merge_prediction, predictions_of(n));
+  if (cells) {
+    add(CostPart::merge_cells, n - 1);
+  } else {
+    add(CostPart::merge_subpixel, n - 1 + colours_share * frames_of_colours(n));
+    add(CostPart::merge_prediction, 1 + colour_prediction * predictions_of_mean(n));
+  }
   return predicted_s(cost, work.size, parts);
 }
 

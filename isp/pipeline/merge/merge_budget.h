@@ -16,6 +16,9 @@ inline constexpr int sampled_frames = 5;
 /// noise hides in a single frame.
 bool predicts_again(int averaged, int frames);
 
+/// Returns whether such a merge predicts the reference anew after more than `averaged` frames.
+bool will_predict_again(int averaged, int frames);
+
 /// Describes the frames to merge, and what of the method is open to choice.
 struct MergeWork {
   int frames = 1;

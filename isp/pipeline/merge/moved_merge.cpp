@@ -96,13 +96,12 @@ Result<void> MovedMerge::add_frames() {
     if (Result<void> added = add(*frame, index); !added) return added;
     if (work_.out.frames[static_cast<std::size_t>(index)].used_fraction == 0 || !predicts_again(++averaged)) continue;
     if (Result<void> again = predict_again(); !again) return again;
+    if (!will_predict_again(averaged, work_.count)) colours_.reset();
   }
   return {};
 }
 
 void MovedMerge::encode() {
-  differences_ = {};
-  placed_ = {};
   work_.adopt_saturation();
   RawFrame& frame = work_.loader.reference();
   if (drizzle_) {
@@ -197,40 +196,36 @@ Result<void> MovedMerge::predict() {
   return {};
 }
 
-/// Returns whether the mean of so many frames is to predict the reference in place of a mean of fewer.
-bool MovedMerge::predicts_again(int averaged) const {
-  const bool by_differences = work_.out.alignment == MergeAlignment::subpixel && !drizzle_ && !work_.out.bracket;
-  return by_differences && isp::predicts_again(averaged, work_.count);
+/// Returns whether the mean is one of differences to the prediction.
+bool MovedMerge::averages_differences() const {
+  return work_.out.alignment == MergeAlignment::subpixel && !work_.options.drizzle && !work_.out.bracket;
 }
 
-/// Predicts the reference from the mean of the frames so far.
+/// Returns whether the mean of so many frames is to predict the reference in place of a mean of fewer.
+bool MovedMerge::predicts_again(int averaged) const {
+  return averages_differences() && isp::predicts_again(averaged, work_.count);
+}
+
+/// Predicts the reference from the mean of the frames so far, of all colours at every pixel.
 Result<void> MovedMerge::predict_again() {
-  differences_ = {};
-  placed_ = {};
-  prediction_ = {};
-  Result<CameraRgb> predicted = predicted_electrons(mean_->clone(), work_.reference, work_.loader.reference(),
-                                                    work_.loader.reference_options(), work_.executor);
+  Result<void> predicted = predict_electrons(*colours_, work_.reference, work_.loader.reference(),
+                                             work_.loader.reference_options(), prediction_, work_.executor);
   if (!predicted) return tl::make_unexpected(at_frame(predicted.error(), work_.loader.reference_name()));
-  prediction_ = *std::move(predicted);
-  make_room_for_frame();
   work_.clock.lap("prediction");
   return {};
 }
 
-void MovedMerge::make_room_for_frame() {
-  differences_ = Plane<float>(work_.width, work_.height);
-  placed_ = Plane<float>(work_.width, work_.height);
-}
-
-/// Begins the mean. Until the reference is found, its memory is not needed.
+/// Begins the mean.
 void MovedMerge::begin_sum() {
-  make_room_for_frame();
   level_e_ = mean_level_e();
   if (!by_stars()) drop_radius_px_ = drop_radius_px(work_.count, mean_signal_to_noise(level_e_, work_.reference));
   if (work_.options.drizzle) {
     drizzle_.emplace(work_.width, work_.height, *work_.options.drizzle);
   } else {
     mean_.emplace(work_.width, work_.height);
+  }
+  if (averages_differences() && will_predict_again(1, work_.count)) {
+    colours_.emplace(work_.width, work_.height, merge::colour_drop_density());
   }
 }
 
@@ -268,19 +263,22 @@ Result<void> MovedMerge::add(FrameElectrons& frame, int index) {
     site_weight = bracket_->placed_weights(frame, use.light, *motion);
     work_.clock.lap("exposure ratio");
   }
-  merge::subtract_prediction(view_of(frame), use.light, *motion, expected(), differences_.view(), executor);
-  if (!by_stars() && !drizzle_) frame.signal_e = {};
-  merge::place_nearest(std::as_const(differences_).view(), frame.phase, *motion, expected(), placed_.view(), executor);
-  put_still_blocks(still_, std::as_const(frame.signal_e).view(), placed_.view(), executor);
+  const merge::FrameView signal = view_of(frame);
+  const bool keeps_signal = by_stars() || drizzle_;
+  Plane<float> differences = keeps_signal ? Plane<float>(work_.width, work_.height) : std::move(frame.signal_e);
+  merge::subtract_prediction(signal, use.light, *motion, expected(), differences.view(), executor);
+  Plane<float> placed(work_.width, work_.height);
+  merge::place_nearest(std::as_const(differences).view(), frame.phase, *motion, expected(), placed.view(), executor);
+  put_still_blocks(still_, std::as_const(frame.signal_e).view(), placed.view(), executor);
   work_.clock.lap("placement");
   double error_px = motion->standard_error_px;
   if (work_.out.alignment != MergeAlignment::none) error_px += predicts() ? predicted_error_px : cell_error_px;
   merge::Comparison found =
-      work_.compared(placed_, merge::noise_in_light(frame.variance_e2, use.light),
+      work_.compared(placed, merge::noise_in_light(frame.variance_e2, use.light),
                      {.block_false_alarm = work_.options.false_alarm, .displacement_error_px = error_px}, index);
   if (is_least)
     bracket_->set_matches(found.block_matches.empty() ? Plane<std::uint8_t>() : found.block_matches.clone());
-  add_matching({frame, *motion, use.light, differences_, placed_, site_weight}, found.block_matches, index);
+  add_matching({frame, *motion, use.light, differences, placed, site_weight}, found.block_matches, index);
   work_.clock.lap("mean");
   return {};
 }
@@ -334,7 +332,16 @@ void MovedMerge::add_matching(const MovedFrame& moved, Plane<std::uint8_t>& matc
   }
   const Plane<std::uint8_t> still = still_.empty() ? Plane<std::uint8_t>() : take_still_blocks(matches);
   add_drops(moved, part(matches));
+  add_colours(moved, std::as_const(matches).view());
   if (!still.empty()) merge::add_placed(moved.placed.view(), part(still), *mean_, work_.executor);
+}
+
+/// Adds the differences of a frame to the mean of all colours.
+void MovedMerge::add_colours(const MovedFrame& moved, PlaneView<const std::uint8_t> block_matches) {
+  if (!colours_ || colour_frames_ == merge::ColourMean::max_frames) return;
+  merge::add_colour_drops(moved.differences.view(), work_.reference.phase, moved.motion, expected(), block_matches,
+                          *colours_, work_.executor);
+  ++colour_frames_;
 }
 
 /// Adds the values of a frame as drops: those of stars as they are, others as differences to the prediction.

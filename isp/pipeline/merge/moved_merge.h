@@ -58,16 +58,17 @@ class MovedMerge {
   Result<void> check_bracket() const;
   Result<void> prepare_alignment();
   Result<void> predict();
+  bool averages_differences() const;
   bool predicts_again(int averaged) const;
   Result<void> predict_again();
   Result<void> average_reference();
   void begin_sum();
-  void make_room_for_frame();
   void add_reference();
   Result<void> add(FrameElectrons& frame, int index);
   std::optional<merge::Motion> motion_of(const FrameElectrons& frame, double light, int index);
   std::optional<merge::Motion> measured_motion(const FrameElectrons& frame, double light, int index);
   void add_matching(const MovedFrame& moved, Plane<std::uint8_t>& matches, int index);
+  void add_colours(const MovedFrame& moved, PlaneView<const std::uint8_t> block_matches);
   void add_drops(const MovedFrame& moved, const merge::MeanPart& part);
   Plane<std::uint8_t> take_still_blocks(Plane<std::uint8_t>& matches) const;
   PerSite<double> mean_level_e() const;
@@ -82,7 +83,8 @@ class MovedMerge {
   Plane<std::uint8_t> still_;              // blocks of the foreground: 1; empty: none
   std::optional<merge::MosaicMean> mean_;  // the sum is one of these
   std::optional<merge::Drizzle> drizzle_;
-  Plane<float> differences_, placed_;     // of the frame that is added
+  std::optional<merge::ColourMean> colours_;  // from which the reference is predicted again
+  int colour_frames_ = 0;
   PerSite<double> level_e_{};             // mean signal, for the weights of drizzling and the size of drops
   double frames_used_ = 0;                // as drops, by the share of their blocks that count
   std::array<double, 3> excess_noise_{};  // sum of what their drops add to the variance, over that of a frame

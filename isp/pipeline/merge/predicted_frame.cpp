@@ -1,10 +1,15 @@
 #include "isp/pipeline/merge/predicted_frame.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <utility>
 #include <variant>
 
+#include "isp/pipeline/finished/raw_codes.h"
 #include "isp/pipeline/merge/merged_mosaic.h"
 #include "isp/pipeline/plan/plan_develop.h"
 #include "isp/pipeline/render/pipeline.h"
@@ -13,6 +18,9 @@ namespace lowlux::isp {
 namespace {
 
 constexpr std::int64_t max_whole_mean_px = 10'000'000;
+constexpr std::int64_t strip_px = 4'000'000;
+constexpr int strip_margin_px = 64;  // above and below, as tiles with levels up to standard have it in cells
+constexpr int least_strip_rows = 128;
 
 /// Returns the description of a frame whose image is its whole active area, without gains. The samples are borrowed
 /// from `frame` and have to be given back.
@@ -22,12 +30,20 @@ RawFrame whole_area(RawFrame& frame) {
   out.raw.default_crop = {0, 0, out.raw.active.width, out.raw.active.height};
   out.colour = frame.colour;
   out.noise = frame.noise;
+  out.noise_ratio = frame.noise_ratio;
   out.corrections.defects = frame.corrections.defects;
   return out;
 }
 
-/// Implements predicted_electrons() in tiles, for frames above `limits`.
-Result<CameraRgb> predicted(RawFrame& frame, const DevelopOptions& options, const TileLimits& limits,
+/// Says how a frame is predicted.
+struct PredictionWay {
+  denoise::Level level = denoise::Level::standard;
+  TileLimits limits;
+  std::optional<std::array<double, 3>> white_e;  // light at white of R, G, B; absent: that of the frame
+};
+
+/// Implements predicted_electrons().
+Result<CameraRgb> predicted(RawFrame& frame, const DevelopOptions& options, const PredictionWay& way,
                             Executor& executor) {
   const Rect crop = frame.raw.default_crop;
   RawFrame whole = whole_area(frame);
@@ -36,18 +52,17 @@ Result<CameraRgb> predicted(RawFrame& frame, const DevelopOptions& options, cons
     frame.raw.default_crop = crop;
   };
   RawElectrons charge;
-  Result<DevelopPlan> plan =
-      plan_develop(whole, options_of_signal(options, denoise::Level::standard), executor, &charge);
+  Result<DevelopPlan> plan = plan_develop(whole, options_of_signal(options, way.level), executor, &charge);
   if (!plan) {
     give_back();
     return tl::make_unexpected(std::move(plan.error()));
   }
   Picture picture = make_picture(*plan);
-  Pipeline(executor, limits).render(whole, *plan, picture, std::move(charge));
+  Pipeline(executor, way.limits).render(whole, *plan, picture, std::move(charge));
   give_back();
   CameraRgb out;
   out.plane = std::move(std::get<SceneLinear>(picture).plane);
-  const std::array<double, 3> light_e = light_at_white_by_colour(frame.raw, plan->levels);
+  const std::array<double, 3> light_e = way.white_e ? *way.white_e : light_at_white_by_colour(frame.raw, plan->levels);
   for_each_index(executor, out.height(), [&](int y) {
     for (std::size_t c = 0; c < 3; ++c) {
       const auto scale = static_cast<float>(light_e[c]);
@@ -56,6 +71,25 @@ Result<CameraRgb> predicted(RawFrame& frame, const DevelopOptions& options, cons
     }
   });
   return out;
+}
+
+/// Returns the options for a mean, of which black and defects are removed.
+DevelopOptions without_black(DevelopOptions options) {
+  options.black = {};
+  options.estimate_dark = options.find_defects = false;
+  return options;
+}
+
+/// Returns the light at white of R, G and B of one frame. The NoiseProfile of a mean counts the electrons of all its
+/// frames.
+std::array<double, 3> white_of(const ColourLevels& levels) {
+  return {levels.white_e[0], levels.white_e[1], levels.white_e[2]};
+}
+
+/// Returns the rows of a strip without its margins, a multiple of these.
+int strip_rows(int width) {
+  const auto rows = static_cast<int>(strip_px / width) - 2 * strip_margin_px;
+  return std::max(rows - rows % strip_margin_px, least_strip_rows);
 }
 
 }  // namespace
@@ -72,26 +106,49 @@ Result<CameraRgb> predicted_electrons(merge::MosaicMean mean, const FrameElectro
   merged.frames.resize(1);
   encode_merged(mean, reference, {}, like, merged, executor);
   mean = merge::MosaicMean(0, 0);
-  DevelopOptions options_of_mean = options;
-  options_of_mean.black = {};
-  options_of_mean.estimate_dark = options_of_mean.find_defects = false;
   // Tiles bound the memory, as the mean is kept in addition to the frame made of it.
-  Result<CameraRgb> out = predicted(merged.frame, options_of_mean, {.max_whole_px = max_whole_mean_px}, executor);
-  if (!out) return out;
-  // The NoiseProfile of a mean counts as electrons those of all its frames, as many as it states for each colour.
-  std::array<double, 3> frame_white_e{};
-  for (int site = 0; site < 4; ++site) {
-    const auto colour = static_cast<std::size_t>(colour_at(reference.phase, site & 1, site >> 1));
-    frame_white_e[colour] += reference.light_at_white_e[site] * (colour == 1 ? 0.5 : 1);
-  }
+  return predicted(merged.frame, without_black(options),
+                   {.limits = {.max_whole_px = max_whole_mean_px}, .white_e = white_of(colour_levels(reference))},
+                   executor);
+}
+
+Result<void> predict_electrons(const merge::ColourMean& mean, const FrameElectrons& reference, const RawFrame& frame,
+                               const DevelopOptions& options, CameraRgb& prediction, Executor& executor) {
+  const ColourLevels levels = colour_levels(reference);
+  const std::array<double, 3> variance = mean.variance(executor);
+  RawFrame strip{.colour = frame.colour, .noise = NoiseProfile{.source = frame.noise->source}};
   for (std::size_t c = 0; c < 3; ++c) {
-    const auto scale = static_cast<float>(frame_white_e[c] * merged.frame.noise->scale[c]);
-    Plane<float>& plane = out->plane[c];
-    for_each_index(executor, plane.height(), [&](int y) {
-      for (int x = 0; x < plane.width(); ++x) plane.at(x, y) *= scale;
-    });
+    strip.noise->scale[c] = variance[c] / levels.white_e[c];
+    strip.noise->offset[c] = variance[c] * levels.variance_e2[c] / std::pow(levels.white_e[c], 2);
   }
-  return out;
+  const DevelopOptions options_of_mean = without_black(options);
+  const PredictionWay way{.level = denoise::Level::draft, .white_e = white_of(levels)};
+  RawDn like;
+  like.layout = SensorLayout::linear_rgb;
+  const int height = mean.height(), step = strip_rows(mean.width());
+  for (int first = 0; first < height; first += step) {
+    const int last = std::min(first + step, height);
+    const RowBand rows{std::max(first - strip_margin_px, 0), std::min(last + strip_margin_px, height)};
+    merge::ColourMean::Image image = mean.image(rows, variance, std::as_const(prediction).view(), executor);
+    strip.noise_ratio = std::make_shared<const NoiseRatio>(std::move(image.noise_ratio));
+    const PlaneView<const float> samples = std::as_const(image.samples).view();
+    strip.raw = encode_signal({.signal_e = samples,
+                               .charge_e = samples,
+                               .saturation_e = reference.saturation_e,
+                               .signal_at_white_e = levels.white_e,
+                               .charge_at_white_e = levels.white_e},
+                              like, float_levels(), executor);
+    image.samples = {};
+    const Result<CameraRgb> developed = predicted(strip, options_of_mean, way, executor);
+    if (!developed) return tl::make_unexpected(developed.error());
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t skipped = static_cast<std::size_t>(first - rows.first) * static_cast<std::size_t>(mean.width());
+      std::copy_n(developed->plane[c].data() + skipped,
+                  static_cast<std::size_t>(last - first) * static_cast<std::size_t>(mean.width()),
+                  prediction.plane[c].row(first));
+    }
+  }
+  return {};
 }
 
 }  // namespace lowlux::isp

@@ -16,7 +16,7 @@ namespace lowlux::isp {
 /// Errors: those of develop.
 Result<CameraRgb> predicted_electrons(RawFrame& frame, const DevelopOptions& options, Executor& executor);
 
-/// Predicts a frame from a mean of frames in its place, in electrons of one frame.
+/// Predicts a frame from a mean of mosaics in its place, in electrons of one frame.
 /// @param mean       in electrons of the reference
 /// @param reference  the noise and levels of the reference
 /// @param frame      the reference as it was read, for its colour and noise
@@ -24,5 +24,12 @@ Result<CameraRgb> predicted_electrons(RawFrame& frame, const DevelopOptions& opt
 /// Errors: those of develop.
 Result<CameraRgb> predicted_electrons(merge::MosaicMean mean, const FrameElectrons& reference, const RawFrame& frame,
                                       const DevelopOptions& options, Executor& executor);
+
+/// Predicts a frame anew from the mean of frames in its place, in electrons of the reference. It is developed with
+/// Level::draft, in strips of rows, which bounds the memory.
+/// @param prediction  replaced; its values count where no frame has any
+/// The others as above. Errors: those of develop, with part of the prediction replaced.
+Result<void> predict_electrons(const merge::ColourMean& mean, const FrameElectrons& reference, const RawFrame& frame,
+                               const DevelopOptions& options, CameraRgb& prediction, Executor& executor);
 
 }  // namespace lowlux::isp
