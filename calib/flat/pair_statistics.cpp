@@ -26,6 +26,11 @@ struct SiteSums {
 
 using SiteBlocks = std::array<std::vector<BlockSums>, 4>;
 
+/// Sums of the codes of a column in rows of one parity: those of one site.
+struct ColumnSums {
+  std::int64_t a = 0, b = 0;
+};
+
 struct Codes {
   PlaneView<const std::uint16_t> a, b;
 };
@@ -36,7 +41,8 @@ struct RowSite {
   double white_dn;
 };
 
-void add_row(const Codes& codes, const RowSite& which, SiteSums& sums, std::vector<BlockSums>& blocks) {
+void add_row(const Codes& codes, const RowSite& which, SiteSums& sums, std::vector<BlockSums>& blocks,
+             std::vector<ColumnSums>& columns) {
   const std::uint16_t* a = codes.a.row(which.y);
   const std::uint16_t* b = codes.b.row(which.y);
   std::int64_t row_difference = 0, row_pixels = 0;
@@ -48,6 +54,8 @@ void add_row(const Codes& codes, const RowSite& which, SiteSums& sums, std::vect
       block.a += va;
       block.b += vb;
       block.ab += va * vb;
+      columns[x].a += va;
+      columns[x].b += vb;
       ++row_pixels;
       row_difference += d;
       sums.difference_squared += d * d;
@@ -96,6 +104,23 @@ SiteStatistics statistics_of(const SiteSums& s) {
   return out;
 }
 
+/// Returns the part of the covariance that whole columns have in common. The means of columns of n rows covary by it
+/// and by 1 / n of the rest.
+double column_covariance(const std::vector<ColumnSums>& columns, int parity, const SiteStatistics& site) {
+  const double rows = site.rows, count = static_cast<double>(site.pixels) / rows;
+  if (count < 2 || rows < 2) return 0;
+  double a = 0, b = 0, ab = 0;
+  for (std::size_t x = static_cast<std::size_t>(parity); x < columns.size(); x += 2) {
+    a += static_cast<double>(columns[x].a) / rows;
+    b += static_cast<double>(columns[x].b) / rows;
+  }
+  for (std::size_t x = static_cast<std::size_t>(parity); x < columns.size(); x += 2) {
+    ab +=
+        (static_cast<double>(columns[x].a) / rows - a / count) * (static_cast<double>(columns[x].b) / rows - b / count);
+  }
+  return (ab / (count - 1) - site.covariance_dn2 / rows) / (1 - 1 / rows);
+}
+
 PlaneView<const std::uint16_t> active_view(const RawDn& raw) {
   return raw.dn.view().crop(raw.active.x, raw.active.y, raw.active.width, raw.active.height);
 }
@@ -113,16 +138,22 @@ Result<PairStatistics> measure_pair(const RawDn& a, const RawDn& b) {
   const Codes codes{active_view(a), active_view(b)};
   PerSite<SiteSums> sums{};
   SiteBlocks blocks;
+  std::array<std::vector<ColumnSums>, 2> columns;  // by parity of the rows
+  for (auto& of_rows : columns) of_rows.resize(static_cast<std::size_t>(codes.a.width));
   for (auto& row_of_blocks : blocks) row_of_blocks.resize((codes.a.width + block_pixels - 1) / block_pixels);
   for (int y = 0; y < codes.a.height; ++y) {
     for (int parity = 0; parity < 2; ++parity) {
       const int site = site_of(parity, y);
-      add_row(codes, {y, parity, setting->white_dn[channel_of_site(*setting, site)]}, sums[site], blocks[site]);
+      add_row(codes, {y, parity, setting->white_dn[channel_of_site(*setting, site)]}, sums[site], blocks[site],
+              columns[y % 2]);
     }
     if (y % block_pixels == block_pixels - 1 || y == codes.a.height - 1) close_blocks(blocks, sums);
   }
   PairStatistics out{std::move(*setting), {}};
-  for (int site = 0; site < 4; ++site) out.site[site] = statistics_of(sums[site]);
+  for (int site = 0; site < 4; ++site) {
+    out.site[site] = statistics_of(sums[site]);
+    out.site[site].column_covariance_dn2 = column_covariance(columns[site >> 1], site & 1, out.site[site]);
+  }
   return out;
 }
 

@@ -16,11 +16,13 @@ struct SiteStatistics {
   double mean_dn = 0;       // of both frames
   double drift_dn = 0;      // mean of b less mean of a
   double variance_dn2 = 0;  // temporal: half the variance of b - a about its mean (EMVA 1288), quantisation included
-  double row_variance_dn2 = 0;   // the part common to whole rows; unbiased, may be negative
-  double covariance_dn2 = 0;     // of a and b within blocks of 32 x 32 sites: the part constant between frames (spatial
-                                 // variance s^2; equal to EMVA's s_mean^2 - sigma^2 / 2); unbiased, may be negative
-  double fraction_at_white = 0;  // fraction of the samples at or above the white level
-  double fraction_at_zero = 0;   // fraction of the samples at code 0
+  double row_variance_dn2 = 0;  // the part common to whole rows; unbiased, may be negative
+  double covariance_dn2 = 0;    // of a and b within blocks of 32 x 32 sites: the part constant between frames (spatial
+                                // variance s^2; equal to EMVA's s_mean^2 - sigma^2 / 2); unbiased, may be negative
+  double column_covariance_dn2 = 0;  // the part of it that whole columns have in common, shading of the frame included;
+                                     // unbiased, may be negative
+  double fraction_at_white = 0;      // fraction of the samples at or above the white level
+  double fraction_at_zero = 0;       // fraction of the samples at code 0
 };
 
 /// Statistics of one pair of frames. Pixels are not kept, so that any number of pairs fits in memory.

@@ -66,8 +66,9 @@ void put_dark_noise(const Darks& darks, Pairs pairs, const TransferLine& line, P
     spatial += darks.spatial_dn2[site] / 4;
     pixels += static_cast<double>(pairs.front().site[site].pixels);
   }
-  const double kept = std::max(0.0, spatial), scatter = darks.variance_dn2 / darks.scatter.pairs;
-  const double error = std::sqrt(((scatter + kept) * (scatter + kept) + kept * kept) / pixels);
+  // Noise is independent between pairs, the pixels are the same.
+  const double kept = std::max(0.0, spatial), total = darks.variance_dn2 + kept;
+  const double error = std::sqrt(((total * total - kept * kept) / darks.scatter.pairs + 2 * kept * kept) / pixels);
   const Estimate dsnu_dn = root(spatial, error);
   out.dsnu_e = scaled(dsnu_dn.value, dsnu_dn.standard_error, out.system_gain_dn_per_e);
 }
@@ -77,20 +78,24 @@ void put_black(const Darks& darks, Pairs pairs, PhotonTransfer& out) {
   const double frames = 2 * darks.scatter.pairs;
   for (int site = 0; site < 4; ++site) {
     const SiteStatistics& s = pairs.front().site[site];
-    const double of_pixels =
-        (darks.variance_dn2 / frames + std::max(0.0, darks.spatial_dn2[site])) / static_cast<double>(s.pixels);
-    out.black_standard_error_dn[site] = std::sqrt(of_pixels + darks.scatter.row_variance_dn2 / (frames * s.rows));
+    const auto pixels = static_cast<double>(s.pixels);
+    const double spatial = std::max(0.0, darks.spatial_dn2[site]);
+    const double of_columns = std::clamp(darks.column_dn2[site], 0.0, spatial);
+    const double of_pixels = darks.variance_dn2 / frames + spatial - of_columns;
+    out.black_standard_error_dn[site] = std::sqrt(of_pixels / pixels + of_columns * s.rows / pixels +
+                                                  darks.scatter.row_variance_dn2 / (frames * s.rows));
   }
 }
 
 void put_prnu(const Curve& curve, Pairs pairs, const Darks& darks, PhotonTransfer& out) {
-  double weights = 0, sum = 0;
+  double weights = 0, sum = 0, variance = 0;
   for (int site = 0; site < 4; ++site) {
     const double half = curve.peak[site].signal_dn / 2;
     double nearest = std::numeric_limits<double>::infinity();
     for (const TransferPoint& p : curve.flats) {
       if (p.site == site) nearest = std::min(nearest, std::fabs(p.signal_dn - half));
     }
+    double of_pattern = 0;
     for (const TransferPoint& p : curve.flats) {
       if (p.site != site || std::fabs(p.signal_dn - half) > nearest + half_saturation_width * half) continue;
       const double signal2 = p.signal_dn * p.signal_dn;
@@ -98,10 +103,14 @@ void put_prnu(const Curve& curve, Pairs pairs, const Darks& darks, PhotonTransfe
       const double total = p.variance_dn2 + quantisation_dn2 + kept;
       const double weight = signal2 * signal2 * p.pixels / (total * total + kept * kept);
       weights += weight;
+      of_pattern += weight * kept / signal2 * std::sqrt(2 / p.pixels);
       sum += weight * (spatial - darks.spatial_dn2[site]) / signal2;
+      // Noise is independent between pairs, the pixels are the same.
+      variance += weight * (total * total - kept * kept) / (total * total + kept * kept);
     }
+    variance += of_pattern * of_pattern;
   }
-  out.prnu = root(sum / weights, 1 / std::sqrt(weights));
+  out.prnu = root(sum / weights, std::sqrt(variance) / weights);
 }
 
 void put_saturation(const Curve& curve, Pairs pairs, const Darks& darks, PhotonTransfer& out) {

@@ -176,6 +176,7 @@ Result<JoinedDarks> join_darks(Pairs darks) {
       const SiteStatistics& s = pair.site[site];
       out.mean_dn[site] += share * s.mean_dn;
       out.spatial_dn2[site] += share * s.covariance_dn2;
+      out.column_dn2[site] += share * s.column_covariance_dn2;
       out.variance_dn2 += share * s.variance_dn2 / 4;
       out.scatter.row_variance_dn2 += share * s.row_variance_dn2 / 4;
     }

@@ -51,7 +51,8 @@ TransferLine fit_line(std::span<const TransferPoint> points, const DarkScatter& 
 struct JoinedDarks {
   PerSite<double> mean_dn{};
   PerSite<double> spatial_dn2{};
-  double variance_dn2 = 0;  // temporal, of all sites, quantisation included
+  PerSite<double> column_dn2{};  // the part of it that whole columns have in common
+  double variance_dn2 = 0;       // temporal, of all sites, quantisation included
   DarkScatter scatter;
 };
 

@@ -64,6 +64,25 @@ TEST(PairStatistics, TellRowsFromPixels) {
   }
 }
 
+TEST(PairStatistics, TellColumnsFromPixels) {
+  std::mt19937 engine(4);
+  std::normal_distribution<double> normal;
+  constexpr int side = 512;
+  std::vector<double> column(side), pixel(side * side);
+  for (double& c : column) c = 20 * normal(engine);
+  for (double& p : pixel) p = 30 * normal(engine);
+  const auto noisy = [&] {
+    return bayer_frame(side, side, BayerPhase::rggb, [&](int x, int y) {
+      return static_cast<int>(std::lround(1000 + column[x] + pixel[side * y + x] + 10 * normal(engine)));
+    });
+  };
+  const auto found = measure_pair(noisy(), noisy());
+  ASSERT_TRUE(found);
+  for (const SiteStatistics& s : found->site) {
+    EXPECT_NEAR(s.column_covariance_dn2, 400, 5 * std::sqrt(2.0 / 255) * (400 + 1000.0 / 256));
+  }
+}
+
 TEST(PairStatistics, CountClippedSamplesOfTheActiveAreaOnly) {
   RawDn raw = bayer_frame(40, 36, BayerPhase::rggb, [](int x, int) { return x < 8 ? 0 : 4095; });
   raw.active = {6, 2, 32, 32};

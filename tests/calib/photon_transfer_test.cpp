@@ -99,9 +99,10 @@ Shots small_shots(const SensorModel& sensor = test::modern_small(), std::uint64_
 
 // Binomial: 200 intervals of 95 % hold the truth in 90 to 99.5 % of cases unless the errors are wrong by 20 % or so.
 TEST(PhotonTransfer, IntervalsHoldTheTruthAsOftenAsTheySay) {
-  const SensorModel truth = test::column_noise_sensor();
+  SensorModel truth = test::column_noise_sensor();
+  truth.prnu = 0.02;
   const double noise = std::hypot(truth.read_noise_e, truth.row_noise_e);
-  int gain_held = 0, noise_held = 0;
+  int gain_held = 0, noise_held = 0, black_held = 0, prnu_held = 0;
   double gain_sum = 0, error_sum = 0;
   constexpr int seeds = 200;
   for (int seed = 1; seed <= seeds; ++seed) {
@@ -113,10 +114,12 @@ TEST(PhotonTransfer, IntervalsHoldTheTruthAsOftenAsTheySay) {
     };
     gain_held += holds(found->system_gain_dn_per_e, truth.system_gain_dn_per_e);
     noise_held += holds(*found->read_noise_e, noise);
+    black_held += holds({found->black_dn[0], found->black_standard_error_dn[0]}, truth.black_level_dn);
+    prnu_held += holds(found->prnu, truth.prnu);
     gain_sum += found->system_gain_dn_per_e.value;
     error_sum += found->system_gain_dn_per_e.standard_error;
   }
-  for (const int held : {gain_held, noise_held}) {
+  for (const int held : {gain_held, noise_held, black_held, prnu_held}) {
     EXPECT_GE(held, 0.9 * seeds);
     EXPECT_LE(held, 0.995 * seeds);
   }
