@@ -22,7 +22,10 @@ struct DarkTemperatureLaw {
   double temperature_c = 0;
   std::array<Estimate, 3> current_e_per_s{};
   Estimate doubling_c;
-  double reduced_chi_square = 0;
+  /// Largest relative deviation of a current from the law, where the errors of the currents do not explain it: the
+  /// standard errors of the law then follow from the deviations. Else 0.
+  double misfit = 0;
+  double reduced_chi_square = 0;  // with the errors of the currents
   int degrees_of_freedom = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -41,6 +42,26 @@ std::vector<LogPoint> log_points(std::span<const double> temperature_c,
   return out;
 }
 
+/// Puts the quality of the fit into the law. Where the currents follow another law, as Arrhenius' with a floor, they
+/// deviate alike in all channels: the deviations of the temperatures, not of their channels, are independent.
+/// @param deviations  of the logarithms from the law
+/// @return the factor of the standard errors
+double judge(std::span<const LogPoint> points, std::span<const double> deviations, DarkTemperatureLaw& law) {
+  double chi_square = 0, largest = 0;
+  std::set<double> temperatures_c;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    chi_square += std::pow(deviations[i] / points[i].error, 2);
+    largest = std::max(largest, std::expm1(std::fabs(deviations[i])));
+    temperatures_c.insert(points[i].temperature_c);
+  }
+  law.degrees_of_freedom = static_cast<int>(points.size()) - 4;
+  law.reduced_chi_square = chi_square / std::max(1, law.degrees_of_freedom);
+  if (law.degrees_of_freedom < 1) return 1;
+  if (law.reduced_chi_square <= 1 + certain * std::sqrt(2.0 / law.degrees_of_freedom)) return 1;
+  law.misfit = largest;
+  return std::sqrt(chi_square / std::max(1.0, static_cast<double>(temperatures_c.size()) - 2));
+}
+
 /// Fits ln D_k(T) = a_k + b (T - T_0); the gain is common to all and changes only a_k.
 std::optional<DarkTemperatureLaw> law_of(std::span<const LogPoint> points, double reference_c, const Estimate& gain) {
   Design design;
@@ -63,7 +84,14 @@ std::optional<DarkTemperatureLaw> law_of(std::span<const LogPoint> points, doubl
     found[i].standard_error = std::sqrt(found[i].standard_error);
   }
   if (!(found[3].value > certain * found[3].standard_error)) return std::nullopt;
+  std::vector<double> deviations;
+  for (const LogPoint& point : points) {
+    deviations.push_back(point.log_dn - found[point.channel].value -
+                         found[3].value * (point.temperature_c - reference_c));
+  }
   DarkTemperatureLaw law;
+  const double factor = judge(points, deviations, law);
+  for (Estimate& parameter : found) parameter.standard_error *= factor;
   law.temperature_c = reference_c;
   for (int k = 0; k < 3; ++k) {
     const double current = std::exp(found[k].value);
@@ -71,12 +99,6 @@ std::optional<DarkTemperatureLaw> law_of(std::span<const LogPoint> points, doubl
   }
   const double doubling = std::numbers::ln2 / found[3].value;
   law.doubling_c = {doubling, doubling * found[3].standard_error / found[3].value};
-  for (const auto& point : points) {
-    const double fitted = found[point.channel].value + found[3].value * (point.temperature_c - reference_c);
-    law.reduced_chi_square += std::pow((point.log_dn - fitted) / point.error, 2);
-  }
-  law.degrees_of_freedom = static_cast<int>(points.size()) - 4;
-  law.reduced_chi_square /= std::max(1, law.degrees_of_freedom);
   return law;
 }
 

@@ -134,6 +134,17 @@ void warn_of_light(const calib::DarkGroup& group, const Darks& darks, std::vecto
   }
 }
 
+/// Warns of dark current that does not double with a fixed number of degrees, as profiles state it.
+void warn_of_law(const calib::DarkSeries& series, std::vector<std::string>& warnings) {
+  if (!series.law || !(series.law->misfit > 0)) return;
+  const double low_c = *series.currents.front().temperature_c, high_c = *series.currents.back().temperature_c;
+  warnings.push_back(
+      fmt::format("from {:g} to {:g} C the dark current does not double with a fixed number of degrees: the profile is "
+                  "off by up to "
+                  "{:.2g} %; use darks of the temperatures of the images only",
+                  low_c, high_c, 100 * series.law->misfit));
+}
+
 struct Gain {
   Estimate dn_per_e;
   std::string source;
@@ -213,6 +224,7 @@ Result<void> calibrate_set(const calib::DarkSet& set, const Darks& darks, const 
   if (!gain) return tl::make_unexpected(gain.error());
   auto series = calib::fit_dark_series(set.groups, gain->dn_per_e);
   if (!series) return tl::make_unexpected(series.error());
+  warn_of_law(*series, found.warnings);
   GainProfile& profile = calib::gain_at(found.profile, set.groups.front().setting);
   calib::put_dark_series(*series, set.groups, gain->dn_per_e, measured, profile);
   if (args.masked) profile.hot_pixels.clear();  // their coordinates are not those of active pixels
