@@ -14,7 +14,6 @@ namespace lowlux::calib {
 namespace {
 
 constexpr double hot_deviations = 8;
-constexpr double full_fraction = 0.95;  // of the white level: above it a pixel may be saturated
 constexpr double max_excluded = 0.05;
 constexpr double clipped_share = 1e-3;
 constexpr double min_misfit = 0.02;   // of the dark charge: smallest deviation that counts as nonlinear
@@ -22,6 +21,10 @@ constexpr double min_gradient = 0.1;  // of the dark charge, from edge to edge
 constexpr double certain = 5;         // standard errors
 
 using Groups = std::span<const DarkGroup>;
+
+double full_dn_of(const FrameSetting& setting) {
+  return full_fraction * *std::min_element(setting.white_dn.begin(), setting.white_dn.end());
+}
 
 Result<void> check_groups(Groups groups) {
   if (groups.empty()) return fail(ErrorCode::insufficient, "there are no dark frames");
@@ -44,6 +47,15 @@ Result<void> check_groups(Groups groups) {
           fmt::format("{:.2g} % of the samples of {} are at code 0, so their mean is too high; raise the camera's "
                       "black level (offset)",
                       100 * zero, what));
+    }
+    const double full = saturated_fraction(groups[g], full_dn_of(groups[g].setting));
+    if (full > max_excluded) {
+      return fail(
+          ErrorCode::insufficient,
+          fmt::format("{:.2g} % of the pixels of {} are saturated, so their mean is too low; leave out the darks "
+                      "of {:g} s{} or take shorter ones",
+                      100 * full, what, *groups[g].setting.exposure_s,
+                      first.temperature_c ? fmt::format(" at {:g} C", *groups[g].setting.temperature_c) : ""));
     }
   }
   return {};
@@ -157,8 +169,7 @@ void put_patterns(const DarkFit& s, std::size_t darkest, DarkSeries& out) {
 /// Returns the excess of one pixel in the longest darks of that temperature in which it is not saturated; if it always
 /// is, in the shortest: then this is a lower bound.
 double excess_e_per_s(const DarkFit& s, std::size_t darkest, int x, int y) {
-  const auto& white = s.groups[darkest].setting.white_dn;
-  const double full_dn = full_fraction * *std::min_element(white.begin(), white.end());
+  const double full_dn = full_dn_of(s.groups[darkest].setting);
   const auto time_of = [&](std::size_t g) { return *s.groups[g].setting.exposure_s; };
   std::optional<std::size_t> longest;
   std::size_t shortest = darkest;

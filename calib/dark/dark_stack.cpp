@@ -18,6 +18,12 @@ std::int64_t pixels_of_site(const FrameSetting& s, int site) {
 
 }  // namespace
 
+double saturated_fraction(const DarkGroup& group, double full_dn) {
+  const float* means = group.mean_dn.data();
+  const auto full = std::count_if(means, means + group.mean_dn.size(), [&](float dn) { return dn > full_dn; });
+  return static_cast<double>(full) / static_cast<double>(std::max<std::size_t>(group.mean_dn.size(), 1));
+}
+
 Result<void> check_noise_is_known(const DarkGroup& group) {
   if (group.frames >= 2) return {};
   return fail(ErrorCode::insufficient,

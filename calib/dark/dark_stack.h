@@ -26,6 +26,12 @@ struct DarkGroup {
 /// Returns an error for a single frame, which contains no information about noise.
 Result<void> check_noise_is_known(const DarkGroup& group);
 
+/// Code above which a pixel may be saturated, as a fraction of the white level.
+inline constexpr double full_fraction = 0.95;
+
+/// Returns the fraction of the pixels whose mean is above a code.
+double saturated_fraction(const DarkGroup& group, double full_dn);
+
 /// Frames that a DarkStack holds. The temperature of flats does not matter: their signal is light.
 enum class StackedFrames : unsigned char { darks, flats };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -44,10 +45,16 @@ struct DarkRates {
   std::optional<DarkLaw> law;          // by the means of three or more temperatures, if they determine it
 };
 
+/// Returns whether more than 1 % of the pixels have means above `full_dn`: the mean and the variance of such darks are
+/// too low.
+bool is_saturated(const DarkGroup& group, double full_dn);
+
 /// Fits straight lines to groups of darks of one gain setting, those of each temperature (same_temperature_c) alone;
-/// temperatures with a single exposure time are left out. Standard errors of means include that the pixels are a sample
-/// of the sensor's; those of variances are by the scatter of pixels. Errors: no temperature has two exposure
-/// times; a group has fewer than two frames; cameras differ.
-Result<DarkRates> dark_rates(std::span<const DarkGroup> groups, const Estimate& gain_dn_per_e);
+/// saturated groups and temperatures with a single exposure time are left out. Standard errors of means include that
+/// the pixels are a sample of the sensor's; those of variances are by the scatter of pixels. Errors: no temperature has
+/// two exposure times; a group has fewer than two frames; cameras differ.
+/// @param full_dn  code above which a pixel may be saturated
+Result<DarkRates> dark_rates(std::span<const DarkGroup> groups, const Estimate& gain_dn_per_e,
+                             double full_dn = std::numeric_limits<double>::infinity());
 
 }  // namespace lowlux::calib

@@ -202,6 +202,15 @@ std::string setting_text(const FrameSetting& setting) {
   return setting.temperature_c ? fmt::format("{} at {:g} C", time, *setting.temperature_c) : time;
 }
 
+/// Returns the code above which a dark may be saturated: that of the saturation capacity, where the flats show it.
+double saturation_code(const SheetFrames& frames, const DataSheet& sheet) {
+  const auto& white = frames.darks.front().setting.white_dn;
+  const double of_white_dn = full_fraction * *std::ranges::min_element(white);
+  if (!sheet.saturation_e) return of_white_dn;
+  const double capacity_dn = sheet.saturation_e->value * sheet.transfer.system_gain_dn_per_e.value;
+  return std::min(of_white_dn, mean_of_sites(sheet.transfer.black_dn) + capacity_dn);
+}
+
 std::vector<DarkOfFlats> dark_levels_of_flats(const SheetFrames& frames, const DarkLevels& levels, DataSheet& out) {
   std::vector<DarkOfFlats> darks;
   const FrameSetting* without = nullptr;
@@ -276,7 +285,13 @@ Result<DataSheet> make_data_sheet(const SheetFrames& frames) {
   out.snr_max = snr_max_of(out.saturation_e);
   out.threshold_e = threshold_of(out.transfer);
   out.dynamic_range = ratio_of(out.saturation_e, out.threshold_e);
-  auto rates = dark_rates(frames.darks, out.transfer.system_gain_dn_per_e);
+  const double full_dn = saturation_code(frames, out);
+  for (const DarkGroup& group : frames.darks) {
+    if (!is_saturated(group, full_dn)) continue;
+    out.warnings.push_back(fmt::format("the darks of {} are saturated: dark current is measured without them",
+                                       setting_text(group.setting)));
+  }
+  auto rates = dark_rates(frames.darks, out.transfer.system_gain_dn_per_e, full_dn);
   if (rates) {
     out.dark_rates = *std::move(rates);
   } else if (rates.error().code != ErrorCode::insufficient) {

@@ -50,7 +50,7 @@ struct DataSheet {
   Nonuniformity dsnu_e;
   std::optional<Nonuniformity> prnu;                          // relative
   std::optional<std::array<Estimate, 3>> quantum_efficiency;  // of R, G, B; without filters three times the same
-  std::vector<std::string> warnings;                          // figures that contain dark current
+  std::vector<std::string> warnings;                          // figures that contain dark current, saturated darks
 };
 
 /// Computes the sheet. Errors: those of fit_photon_transfer and spatial_parts; those of dark_rates but for

@@ -313,6 +313,18 @@ TEST(DarkSeries, RefusesCodesThatGiveNoMeans) {
   EXPECT_NE(refusal(groups_at(bench, {{0, 20}, {1, 20}}, 4)).find("code 0"), std::string::npos);
 }
 
+TEST(DarkSeries, RefusesSaturatedDarks) {
+  SensorBench bench = small_bench();
+  const double current = largest(bench.sensor.dark_current_e_per_s);
+  bench.sensor.full_well_e = isp::saturation_charge_e(bench.sensor);
+  const double full_s = bench.sensor.full_well_e / current;
+  // Saturated in all of several times: the mean is linear in none of them, but two of them are equal.
+  EXPECT_NE(refusal(groups_at(bench, {{1.5 * full_s, 20}, {3 * full_s, 20}}, 4)).find("are saturated"),
+            std::string::npos);
+  EXPECT_NE(refusal(groups_at(bench, {{0, 20}, {1.1 * full_s, 20}}, 4)).find("are saturated"), std::string::npos);
+  EXPECT_EQ(refusal(groups_at(bench, {{0, 20}, {0.7 * full_s, 20}}, 4)), "");
+}
+
 TEST(DarkSeries, RefusesAFrameFullOfOutliers) {
   SensorBench bench = small_bench();
   bench.sensor.hot_pixel_fraction = 0.1;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "tests/sensor_bench/sensor_bench.h"
@@ -219,6 +220,33 @@ TEST(DataSheet, FiguresThatContainDarkCurrentAreWarnedOf) {
   const auto warm = make_data_sheet(frames);
   ASSERT_TRUE(warm) << warm.error().message;
   EXPECT_EQ(warm->warnings.size(), 2u);
+}
+
+// Darks that fill the pixels determine no current: with them, that of their temperature would be far too low.
+TEST(DataSheet, SaturatedDarksAreLeftOut) {
+  std::mt19937_64 random(first_seed + 7);
+  for (int round = 0; round < 3; ++round) {
+    const SensorModel truth = drawn_sensor(random);
+    const SensorBench bench{.sensor = truth, .width = 192, .height = 128, .seed = random()};
+    SCOPED_TRACE(testing::Message() << "seed " << first_seed + 7 << ", round " << round);
+    SheetFrames frames = shoot(bench);
+    const double full_s = std::round(1.5 * truth.full_well_e / isp::dark_mean_e(truth, {1, 32})[1]);
+    frames.darks.push_back(stack_of(bench, {full_s, 32}, 5000));
+    const auto sheet = make_data_sheet(frames);
+    ASSERT_TRUE(sheet) << sheet.error().message;
+    const std::string left_out =
+        fmt::format("the darks of {:g} s at 32 C are saturated: dark current is measured without them", full_s);
+    EXPECT_EQ(std::ranges::count(sheet->warnings, left_out), 1);
+    ASSERT_TRUE(sheet->dark_rates);
+    ASSERT_EQ(sheet->dark_rates->rates.size(), 2u);
+    EXPECT_EQ(sheet->dark_rates->rates[1].exposures, 3);
+    for (const DarkRate& rate : sheet->dark_rates->rates) {
+      const double e_per_s = isp::dark_mean_e(truth, {1, *rate.temperature_c})[1];
+      expect_near("dark current by mean", rate.by_mean_e_per_s, e_per_s);
+      expect_near("dark current by variance", rate.by_variance_e_per_s, e_per_s);
+    }
+    expect_near("doubling", *sheet->dark_rates->doubling_c, truth.dark_doubling_c);
+  }
 }
 
 TEST(DataSheet, FlickerOfTheLampChangesNoPrnu) {
