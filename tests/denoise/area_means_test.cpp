@@ -125,6 +125,26 @@ TEST(AreaMeans, TheMiddleOfAnyAreaKeepsItsColour) {
   EXPECT_NEAR(slope.value(), raw_slope, 0.05);
 }
 
+// Colour is lost next to other colours, and a square spreads it evenly: inside of small patches it is too much where
+// they consist of whole squares, and too little where they lie across squares.
+TEST(AreaMeans, InsideSmallPatchesTheErrorIsThatOfTheSquares) {
+  const Camera camera = camera_over(230);
+  constexpr int margin_px = 8;
+  for (const auto& [side_px, most] : {std::pair{64, 0.2}, {96, 0.15}, {128, 0.1}, {192, 0.08}}) {
+    for (const int offset_px : {0, 12, 20}) {
+      const Scene scene = patches(side_px, offset_px);
+      const auto raw = exposed(camera, scene, 1184, 896, 89);
+      const Denoised out(raw, camera, {.rho = no_prior, .keep_means = true});
+      const int first_px = offset_px == 0 ? 0 : side_px - offset_px;
+      const double slope = slope_of(out.signal, camera, scene, side_px, first_px, margin_px).value();
+      const double raw_slope = slope_of(raw, camera, scene, side_px, first_px, margin_px).value();
+      std::printf("patches of %3d px, offset %2d: slope of colours 8 px inside %.3f, of the raw %.3f\n", side_px,
+                  offset_px, slope, raw_slope);
+      EXPECT_NEAR(slope, raw_slope, most) << side_px << ", " << offset_px;
+    }
+  }
+}
+
 // What is added varies between places, and so does its variance: that of the maps is the mean.
 TEST(AreaMeans, TheVarianceIncludesThatOfTheMeans) {
   for (const double dark_e : {2.0, 230.0}) {

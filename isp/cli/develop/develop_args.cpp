@@ -377,8 +377,8 @@ void add_denoise(CLI::App& app, DevelopArgs& args, NoiseLevels levels) {
   add_choice<bool>(
       app, "--chroma-bias", {{"least-error", false}, {"none", true}},
       [&choice](bool unbiased) { choice.unbiased_chroma = unbiased; },
-      "colour hidden by noise: fade it, for the smallest error, or keep the mean colour of areas of 64 px and "
-      "more (default: least-error)");
+      "colour hidden by noise: fade it, for the smallest error, or keep the mean colours of squares of 32x32 px "
+      "(default: least-error)");
 }
 
 void add_line_noise(CLI::App& app, DevelopArgs& args) {
