@@ -52,7 +52,7 @@ Result<void> check_groups(Groups groups) {
     if (full > max_excluded) {
       return fail(
           ErrorCode::insufficient,
-          fmt::format("{:.2g} % of the pixels of {} are saturated, so their mean is too low; leave out the darks "
+          fmt::format("{:.3g} % of the pixels of {} are saturated, so their mean is too low; leave out the darks "
                       "of {:g} s{} or take shorter ones",
                       100 * full, what, *groups[g].setting.exposure_s,
                       first.temperature_c ? fmt::format(" at {:g} C", *groups[g].setting.temperature_c) : ""));

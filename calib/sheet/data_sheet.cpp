@@ -211,6 +211,23 @@ double saturation_code(const SheetFrames& frames, const DataSheet& sheet) {
   return std::min(of_white_dn, mean_of_sites(sheet.transfer.black_dn) + capacity_dn);
 }
 
+void warn_of_saturated_darks(std::span<const DarkGroup> darks, double full_dn, DataSheet& out) {
+  constexpr double hot_pixels = 1e-4;  // whose charge may be some percent of all
+  for (const DarkGroup& group : darks) {
+    const std::string setting = setting_text(group.setting);
+    const double full = saturated_fraction(group, full_dn);
+    if (is_saturated(group, full_dn)) {
+      out.warnings.push_back(
+          fmt::format("the darks of {} are saturated: dark current is measured without them", setting));
+    } else if (full > hot_pixels) {
+      out.warnings.push_back(
+          fmt::format("{:.2g} % of the pixels are saturated in the darks of {}: the mean dark current lacks a part of "
+                      "theirs; take shorter darks",
+                      100 * full, setting));
+    }
+  }
+}
+
 std::vector<DarkOfFlats> dark_levels_of_flats(const SheetFrames& frames, const DarkLevels& levels, DataSheet& out) {
   std::vector<DarkOfFlats> darks;
   const FrameSetting* without = nullptr;
@@ -286,11 +303,7 @@ Result<DataSheet> make_data_sheet(const SheetFrames& frames) {
   out.threshold_e = threshold_of(out.transfer);
   out.dynamic_range = ratio_of(out.saturation_e, out.threshold_e);
   const double full_dn = saturation_code(frames, out);
-  for (const DarkGroup& group : frames.darks) {
-    if (!is_saturated(group, full_dn)) continue;
-    out.warnings.push_back(fmt::format("the darks of {} are saturated: dark current is measured without them",
-                                       setting_text(group.setting)));
-  }
+  warn_of_saturated_darks(frames.darks, full_dn, out);
   auto rates = dark_rates(frames.darks, out.transfer.system_gain_dn_per_e, full_dn);
   if (rates) {
     out.dark_rates = *std::move(rates);

@@ -249,6 +249,22 @@ TEST(DataSheet, SaturatedDarksAreLeftOut) {
   }
 }
 
+TEST(DataSheet, SaturatedHotPixelsAreWarnedOf) {
+  std::mt19937_64 random(first_seed + 8);
+  SensorModel truth = drawn_sensor(random);
+  truth.hot_pixel_fraction = 0.004;
+  truth.hot_pixel_current_e_per_s = truth.full_well_e;
+  const SensorBench bench{.sensor = truth, .width = 192, .height = 128, .seed = random()};
+  const auto sheet = make_data_sheet(shoot(bench));
+  ASSERT_TRUE(sheet) << sheet.error().message;
+  const auto warns = [&](const std::string& text) {
+    return std::ranges::any_of(sheet->warnings, [&](const std::string& w) { return w.find(text) != w.npos; });
+  };
+  EXPECT_TRUE(warns("of the pixels are saturated in the darks of 10 s at 32 C")) << "seed " << first_seed + 8;
+  EXPECT_FALSE(warns("are saturated: dark current is measured without them"));
+  EXPECT_EQ(sheet->dark_rates->rates[1].exposures, 3);
+}
+
 TEST(DataSheet, FlickerOfTheLampChangesNoPrnu) {
   constexpr double prnu = 0.003;
   std::mt19937_64 random(first_seed);
