@@ -9,15 +9,12 @@ file(WRITE "${OUT}.new" "// Generated from ${NAME}'s file.
 #include \"${HEADER}\"
 
 namespace lowlux::isp {
-namespace {
-
-constexpr char text[] = {
+std::string_view ${NAME}() {
+  static constexpr char text[] = {
 ${bytes}
-};
-
-}  // namespace
-
-std::string_view ${NAME}() { return {text, sizeof(text)}; }
+  };
+  return {text, sizeof(text)};
+}
 
 }  // namespace lowlux::isp
 ")

@@ -13,17 +13,14 @@ file(WRITE "${OUT}.new" "// Generated from isp/model/data/${NAME}.csv.
 #include \"isp/model/spectrum/cie_data.h\"
 
 namespace lowlux::isp {
-namespace {
-
-constexpr std::string_view columns[] = {\"${columns}\"};
-constexpr double cells[] = {
+CieTable ${NAME}_table() {
+  static constexpr std::string_view columns[] = {\"${columns}\"};
+  static constexpr double cells[] = {
     ${cells}
-};
-static_assert(sizeof(cells) / sizeof(double) % (sizeof(columns) / sizeof(std::string_view)) == 0);
-
-}  // namespace
-
-CieTable ${NAME}_table() { return {columns, cells}; }
+  };
+  static_assert(sizeof(cells) / sizeof(double) % (sizeof(columns) / sizeof(std::string_view)) == 0);
+  return {columns, cells};
+}
 
 }  // namespace lowlux::isp
 ")

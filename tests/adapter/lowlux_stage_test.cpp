@@ -9,7 +9,7 @@
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/scratch_directory.h"
 
-namespace lowlux {
+namespace lowlux::lowlux_stage_test {
 namespace {
 
 using namespace stage_testing;
@@ -403,4 +403,4 @@ TEST(LowluxStage, LooksOfTheEyeNeedTheLightOfTheScene) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::lowlux_stage_test

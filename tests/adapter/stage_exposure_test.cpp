@@ -16,7 +16,7 @@
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/scratch_directory.h"
 
-namespace lowlux {
+namespace lowlux::stage_exposure_test {
 namespace {
 
 using namespace stage_testing;
@@ -260,4 +260,4 @@ TEST(StageExposure, IsNotWrittenBeyondTheResultsOfEarlierCallers) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::stage_exposure_test

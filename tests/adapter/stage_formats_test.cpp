@@ -7,7 +7,7 @@
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/guarded_memory.h"
 
-namespace lowlux {
+namespace lowlux::stage_formats_test {
 namespace {
 
 using namespace stage_testing;
@@ -226,4 +226,4 @@ TEST(StageFormats, AreDescribedAsTheyAre) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::stage_formats_test

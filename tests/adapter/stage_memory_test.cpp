@@ -10,7 +10,7 @@
 #include "tests/support/count_allocations.h"
 #include "tests/support/this_process.h"
 
-namespace lowlux {
+namespace lowlux::stage_memory_test {
 namespace {
 
 using namespace stage_testing;
@@ -207,4 +207,4 @@ TEST(StageMemory, IsWhatTheLimitTakesItFor) {
 #endif
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::stage_memory_test

@@ -10,7 +10,7 @@
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/scratch_directory.h"
 
-namespace lowlux {
+namespace lowlux::stage_params_profile_test {
 namespace {
 
 using namespace stage_testing;
@@ -150,4 +150,4 @@ TEST(StageParamsWithProfile, AProfileOfAnotherKindOfSensorIsRefused) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::stage_params_profile_test

@@ -7,7 +7,7 @@
 #include "isp/adapter/stage_params.h"
 #include "tests/adapter/stage_frames.h"
 
-namespace lowlux {
+namespace lowlux::stage_params_test {
 namespace {
 
 using namespace stage_testing;
@@ -346,4 +346,4 @@ TEST(StageParams, MaskedPixelsTellBlackUnlessItIsGiven) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::stage_params_test

@@ -10,7 +10,7 @@
 #include "tests/adapter/stage_frames.h"
 #include "tests/support/scratch_directory.h"
 
-namespace lowlux {
+namespace lowlux::stage_test {
 namespace {
 
 using namespace stage_testing;
@@ -338,4 +338,4 @@ TEST(Stage, FramesBeforeLowerTheNoiseOfAStillScene) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::stage_test

@@ -12,7 +12,7 @@
 #include "isp/base/random/random_rows.h"
 #include "tests/support/draw_bits.h"
 
-namespace lowlux {
+namespace lowlux::random_bits_test {
 namespace {
 
 constexpr DrawStream stream{.seed = 0x0123456789abcdef, .frame = 3, .purpose = draw_purpose::electrons};
@@ -131,4 +131,4 @@ TEST(RandomBits, MeansAboveTheLargestCountAsTheLargest) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::random_bits_test

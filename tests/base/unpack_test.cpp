@@ -7,7 +7,7 @@
 
 #include "tests/base/unpack_check.h"
 
-namespace lowlux {
+namespace lowlux::unpack_test {
 namespace {
 
 using namespace unpack_testing;
@@ -166,4 +166,4 @@ TEST(Unpack, TouchesNothingForNoPixels) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::unpack_test

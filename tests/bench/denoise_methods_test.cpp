@@ -7,7 +7,7 @@
 #include "isp/bench/peers/gat_denoise.h"
 #include "isp/render/output_space.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::denoise_methods_test {
 namespace {
 
 BenchPicture picture_of(int width, int height, double contrast) {
@@ -143,4 +143,4 @@ TEST(DenoiseMethods, TuningChoosesLargerWindowsForLessLight) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::denoise_methods_test

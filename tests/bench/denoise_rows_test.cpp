@@ -5,7 +5,7 @@
 
 #include "isp/bench/stages/denoise_bench.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::denoise_rows_test {
 namespace {
 
 DenoiseRow row(const char* method, MethodKind kind, const DenoiseLight& light, double s_per_mp, double psnr_db,
@@ -155,4 +155,4 @@ TEST(BenchStages, AMissingPictureIsAnErrorThatNamesIt) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::denoise_rows_test

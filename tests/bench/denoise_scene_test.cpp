@@ -8,7 +8,7 @@
 
 #include "tests/support/scratch_directory.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::denoise_scene_test {
 namespace {
 
 BenchPicture flat_picture(int width, int height, std::array<float, 3> rgb) {
@@ -172,4 +172,4 @@ TEST(BenchPicture, FilesThatAreNoPicturesAreToldByName) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::denoise_scene_test

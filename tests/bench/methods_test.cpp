@@ -16,7 +16,7 @@
 #include "isp/bench/stages/methods_bench.h"
 #include "tests/support/scratch_directory.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::methods_test {
 namespace {
 
 constexpr std::uint64_t first_seed = 20261125;
@@ -289,4 +289,4 @@ TEST(Methods, ASeedRepeatsARunAndAnotherDoesNot) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::methods_test

@@ -12,7 +12,7 @@
 #include "capture/synthetic/fixed_pattern.h"
 #include "tests/sensor_bench/sensor_bench.h"
 
-namespace lowlux::calib {
+namespace lowlux::calib::dark_frame_test {
 namespace {
 
 using test::SensorBench;
@@ -333,4 +333,4 @@ TEST(DarkLibrary, SortsFramesBySettingAndRefusesOthers) {
 }
 
 }  // namespace
-}  // namespace lowlux::calib
+}  // namespace lowlux::calib::dark_frame_test

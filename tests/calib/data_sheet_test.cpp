@@ -12,7 +12,7 @@
 
 #include "tests/sensor_bench/sensor_bench.h"
 
-namespace lowlux::calib {
+namespace lowlux::calib::data_sheet_test {
 namespace {
 
 using test::SensorBench;
@@ -401,4 +401,4 @@ TEST(SpatialParts, RowsColumnsAndPixelsAreSeparated) {
 }
 
 }  // namespace
-}  // namespace lowlux::calib
+}  // namespace lowlux::calib::data_sheet_test

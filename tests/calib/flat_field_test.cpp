@@ -10,7 +10,7 @@
 
 #include "tests/sensor_bench/sensor_bench.h"
 
-namespace lowlux::calib {
+namespace lowlux::calib::flat_field_test {
 namespace {
 
 using test::SensorBench;
@@ -188,4 +188,4 @@ TEST(FlatField, FlatsThatDifferInSettingAreRefusedByTheirName) {
 }
 
 }  // namespace
-}  // namespace lowlux::calib
+}  // namespace lowlux::calib::flat_field_test

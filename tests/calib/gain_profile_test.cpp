@@ -10,7 +10,7 @@
 #include "calib/profile/profile_use.h"
 #include "tests/sensor_bench/sensor_bench.h"
 
-namespace lowlux::calib {
+namespace lowlux::calib::gain_profile_test {
 namespace {
 
 using test::SensorBench;
@@ -144,4 +144,4 @@ TEST(GainProfile, HotPixelsAreCountedWhereTheyAreNotFullAndAtTheModelsTemperatur
 }
 
 }  // namespace
-}  // namespace lowlux::calib
+}  // namespace lowlux::calib::gain_profile_test

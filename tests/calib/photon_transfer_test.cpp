@@ -9,7 +9,7 @@
 
 #include "tests/sensor_bench/sensor_bench.h"
 
-namespace lowlux::calib {
+namespace lowlux::calib::photon_transfer_test {
 namespace {
 
 using test::SensorBench;
@@ -244,4 +244,4 @@ TEST(PhotonTransfer, RefusesPairsOfDifferentCamerasOrGains) {
 }
 
 }  // namespace
-}  // namespace lowlux::calib
+}  // namespace lowlux::calib::photon_transfer_test

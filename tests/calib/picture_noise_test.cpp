@@ -15,7 +15,7 @@
 #include "capture/file/dng_source.h"
 #include "tests/support/frames.h"
 
-namespace lowlux::calib {
+namespace lowlux::calib::picture_noise_test {
 namespace {
 
 Result<PictureNoise> fit(const RawDn& raw, double black_dn, const PictureNoiseOptions& options = {}) {
@@ -290,4 +290,4 @@ TEST(CodeTracesOfRealRaws, FindTheStepOfFourInTheOpenIspRaw) {
 }
 
 }  // namespace
-}  // namespace lowlux::calib
+}  // namespace lowlux::calib::picture_noise_test

@@ -8,7 +8,7 @@
 
 #include "tests/capture/read_built.h"
 
-namespace lowlux::test {
+namespace lowlux::test::bad_input_test {
 namespace {
 
 std::vector<std::byte> bytes_of(const std::string& text) {
@@ -253,4 +253,4 @@ TEST(BadInput, FilesAreReadLikeBytes) {
 }
 
 }  // namespace
-}  // namespace lowlux::test
+}  // namespace lowlux::test::bad_input_test

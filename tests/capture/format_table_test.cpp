@@ -17,7 +17,7 @@
 #include "tests/support/dng/float_dng.h"
 #include "tests/support/dng/jpeg_xl.h"
 
-namespace lowlux::capture {
+namespace lowlux::capture::format_table_test {
 namespace {
 
 using test::DngBuilder;
@@ -213,4 +213,4 @@ TEST(FormatTable, IsWhatThePageSays) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::format_table_test

@@ -16,7 +16,7 @@
 #include "isp/codec/png.h"
 #include "tests/support/executors.h"
 
-namespace lowlux::capture {
+namespace lowlux::capture::x_trans_test {
 namespace {
 
 using Scene = std::function<double(int x, int y, int colour)>;
@@ -378,4 +378,4 @@ TEST(XTrans, APhotographIsInterpolatedWithTheErrorItHadWhenThisWasWritten) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::x_trans_test

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace lowlux::isp {
+namespace lowlux::isp::noise_ratio_bytes_test {
 namespace {
 
 using Bytes = std::vector<std::byte>;
@@ -111,4 +111,4 @@ TEST(NoiseRatioBytes, ThatClaimMoreThanThereIsTakeNoMemory) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::noise_ratio_bytes_test

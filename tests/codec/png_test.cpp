@@ -7,7 +7,7 @@
 
 #include "tests/codec/pictures.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::png_test {
 namespace {
 
 using test::encoded;
@@ -167,4 +167,4 @@ TEST(PngOfOthers, MorePixelsThanTheLimitAreTooLarge) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::png_test

@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-namespace lowlux::isp {
+namespace lowlux::isp::ppm_test {
 namespace {
 
 Result<DecodedPicture> decoded(const std::string& text) {
@@ -65,4 +65,4 @@ TEST(Ppm, WhatIsNoPpmIsRefusedWithAReason) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::ppm_test

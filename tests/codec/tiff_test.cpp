@@ -11,7 +11,7 @@
 
 #include "tests/codec/pictures.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::tiff_test {
 namespace {
 
 using test::encoded;
@@ -219,4 +219,4 @@ TEST(TiffOfOthers, MorePixelsThanTheLimitAreTooLarge) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::tiff_test

@@ -12,7 +12,7 @@
 #include "tests/denoise/draws.h"
 #include "tests/support/numbers.h"
 
-namespace lowlux::denoise {
+namespace lowlux::denoise::dark_test {
 namespace {
 
 using isp::Xyz;
@@ -197,4 +197,4 @@ TEST(AlphaMap, LeavesOutSaturatedPixelsAndThoseThatAreNotNumbers) {
 }
 
 }  // namespace
-}  // namespace lowlux::denoise
+}  // namespace lowlux::denoise::dark_test

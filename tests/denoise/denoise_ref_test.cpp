@@ -7,7 +7,7 @@
 
 #include "tests/denoise/frames.h"
 
-namespace lowlux {
+namespace lowlux::denoise_ref_test {
 namespace {
 
 using namespace denoise_testing;
@@ -63,4 +63,4 @@ TEST(DenoiseReference, GivesAConstantWithoutNoiseBack) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::denoise_ref_test

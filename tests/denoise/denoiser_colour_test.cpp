@@ -16,7 +16,7 @@
 #include "tests/denoise/draws.h"
 #include "tests/denoise/flat_charts.h"
 
-namespace lowlux {
+namespace lowlux::denoiser_colour_test {
 namespace {
 
 using namespace denoise_testing;
@@ -255,4 +255,4 @@ TEST(DenoiserColour, LosesSaturationByThePriorAsItsConfidenceSaysAndNotOtherwise
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::denoiser_colour_test

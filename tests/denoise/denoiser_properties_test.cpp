@@ -13,7 +13,7 @@
 #include "denoise/denoiser.h"
 #include "tests/denoise/frames.h"
 
-namespace lowlux {
+namespace lowlux::denoiser_properties_test {
 namespace {
 
 using namespace denoise_testing;
@@ -233,4 +233,4 @@ TEST(DenoiserMarks, EdgesOfBlocksDoNotShowInSoftPictures) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::denoiser_properties_test

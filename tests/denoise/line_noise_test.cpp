@@ -12,7 +12,7 @@
 #include "isp/base/random/random.h"
 #include "tests/denoise/draws.h"
 
-namespace lowlux::denoise {
+namespace lowlux::denoise::line_noise_test {
 namespace {
 
 constexpr double read_noise_e = 4;
@@ -239,4 +239,4 @@ TEST(LineNoise, OfAPictureOfOneValueIsNone) {
 }
 
 }  // namespace
-}  // namespace lowlux::denoise
+}  // namespace lowlux::denoise::line_noise_test

@@ -13,7 +13,7 @@
 #include "tests/denoise/frames.h"
 #include "tests/reference/denoise_ref.h"
 
-namespace lowlux {
+namespace lowlux::nl_bayes_test {
 namespace {
 
 using namespace denoise_testing;
@@ -219,4 +219,4 @@ TEST(NlBayes, KnowsWhatItLeavesOfTheNoiseOfTexture) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::nl_bayes_test

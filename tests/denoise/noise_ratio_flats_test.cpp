@@ -14,7 +14,7 @@
 #include "tests/denoise/mixed_frames.h"
 #include "tests/denoise/searcher.h"
 
-namespace lowlux {
+namespace lowlux::noise_ratio_flats_test {
 namespace {
 
 using namespace denoise_testing;
@@ -188,4 +188,4 @@ TEST(NoiseRatioFlats, MakesTheNoiseOfAMixedFrameAgreeWithItsModel) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::noise_ratio_flats_test

@@ -14,7 +14,7 @@
 #include "tests/denoise/draws.h"
 #include "tests/denoise/mixed_frames.h"
 
-namespace lowlux {
+namespace lowlux::noise_ratio_test {
 namespace {
 
 using namespace denoise_testing;
@@ -244,4 +244,4 @@ TEST(NoiseRatio, AgreesWithTheReferenceNextToLamps) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::noise_ratio_test

@@ -12,7 +12,7 @@
 #include "denoise/denoiser.h"
 #include "tests/denoise/frames.h"
 
-namespace lowlux {
+namespace lowlux::stabiliser_test {
 namespace {
 
 using namespace denoise_testing;
@@ -113,4 +113,4 @@ TEST(Stabiliser, KeepsMeansWhateverNoiseIsStated) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::stabiliser_test

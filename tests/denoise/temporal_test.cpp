@@ -15,7 +15,7 @@
 #include "tests/reference/temporal_ref.h"
 #include "tests/support/only_target.h"
 
-namespace lowlux {
+namespace lowlux::temporal_test {
 namespace {
 
 using namespace denoise_testing;
@@ -510,4 +510,4 @@ TEST(TemporalTargets, GiveTheSameBits) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::temporal_test

@@ -23,7 +23,7 @@
 #include "tests/support/sweep.h"
 
 // The state of adaptation: sections 0 and 1 of the mesopic specification.
-namespace lowlux::hard_cases {
+namespace lowlux::hard_cases::mesopic_hard_cases_test {
 namespace {
 
 using isp::Xyz;
@@ -276,4 +276,4 @@ TEST(HardCaseMesopic, WardWithoutX) {
 }
 
 }  // namespace
-}  // namespace lowlux::hard_cases
+}  // namespace lowlux::hard_cases::mesopic_hard_cases_test

@@ -14,7 +14,7 @@
 #include "tests/support/sweep.h"
 
 // Models whose rods speak through opponent channels: sections 2.6, 2.7 and 4 of the mesopic specification.
-namespace lowlux::hard_cases {
+namespace lowlux::hard_cases::opponent_hard_cases_test {
 namespace {
 
 using isp::Xyz;
@@ -132,4 +132,4 @@ TEST(HardCaseMesopic, WhitesThatLeaveRodsOrConesDark) {
 }
 
 }  // namespace
-}  // namespace lowlux::hard_cases
+}  // namespace lowlux::hard_cases::opponent_hard_cases_test

@@ -11,7 +11,7 @@
 
 #include "tests/support/moving_scene.h"
 
-namespace lowlux::test {
+namespace lowlux::test::align_test {
 namespace {
 
 using merge::AlignOptions;
@@ -278,4 +278,4 @@ TEST(Align, BitsAreTheSameForEveryNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace lowlux::test
+}  // namespace lowlux::test::align_test

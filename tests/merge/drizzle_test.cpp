@@ -11,7 +11,7 @@
 #include "tests/merge/drizzle_frames.h"
 #include "tests/support/peak_memory.h"
 
-namespace lowlux::merge {
+namespace lowlux::merge::drizzle_test {
 namespace {
 
 using namespace star_testing;
@@ -237,4 +237,4 @@ TEST(Drizzle, MemoryDoesNotGrowWithTheNumberOfFrames) {
 }
 
 }  // namespace
-}  // namespace lowlux::merge
+}  // namespace lowlux::merge::drizzle_test

@@ -8,7 +8,7 @@
 
 #include "tests/merge/merge_scene.h"
 
-namespace lowlux::merge {
+namespace lowlux::merge::mosaic_mean_test {
 namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -117,4 +117,4 @@ TEST(RobustMean, OfTwoThatDifferIsTheLowerAndOfNoneIsNaN) {
 }
 
 }  // namespace
-}  // namespace lowlux::merge
+}  // namespace lowlux::merge::mosaic_mean_test

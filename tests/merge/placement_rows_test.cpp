@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-namespace lowlux::merge::rows {
+namespace lowlux::merge::rows::placement_rows_test {
 namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -209,4 +209,4 @@ TEST(PlacementRows, EveryPixelGetsTheSumsOfEachColour) {
 }
 
 }  // namespace
-}  // namespace lowlux::merge::rows
+}  // namespace lowlux::merge::rows::placement_rows_test

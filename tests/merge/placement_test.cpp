@@ -9,7 +9,7 @@
 
 #include "tests/merge/merge_scene.h"
 
-namespace lowlux::merge {
+namespace lowlux::merge::placement_test {
 namespace {
 
 /// Returns the mosaic of the smooth scene as a camera sees it that moved: what was at (x, y) is at (x + dx, y + dy).
@@ -160,4 +160,4 @@ TEST(Placement, OutsideOfTheFrameThereIsNoValue) {
 }
 
 }  // namespace
-}  // namespace lowlux::merge
+}  // namespace lowlux::merge::placement_test

@@ -13,7 +13,7 @@
 
 #include "tests/merge/merge_scene.h"
 
-namespace lowlux::merge {
+namespace lowlux::merge::still_blocks_test {
 namespace {
 
 using test::dark_variance_e2;
@@ -114,4 +114,4 @@ TEST(StillBlocks, FramesOfAnySizeAndWithoutValuesAreTaken) {
 }
 
 }  // namespace
-}  // namespace lowlux::merge
+}  // namespace lowlux::merge::still_blocks_test

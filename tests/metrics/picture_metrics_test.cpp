@@ -8,7 +8,7 @@
 #include "isp/base/random/random.h"
 #include "isp/render/output_space.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::picture_metrics_test {
 namespace {
 
 constexpr int width = 64, height = 48;
@@ -227,4 +227,4 @@ TEST(PictureMetrics, ThreadsChangeNoBit) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::picture_metrics_test

@@ -8,7 +8,7 @@
 #include <memory>
 #include <optional>
 
-namespace lowlux::isp {
+namespace lowlux::isp::metadata_test {
 namespace {
 
 struct Unref {
@@ -160,4 +160,4 @@ TEST(WrittenInfo, IsUprightAndNamesTheProgramThatWroteIt) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::metadata_test

@@ -10,7 +10,7 @@
 #include "tests/support/comma_locale.h"
 #include "tests/support/scratch_directory.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::report_test {
 namespace {
 
 std::size_t count(const std::string& text, std::string_view what) {
@@ -184,4 +184,4 @@ TEST(TextFile, IsWrittenWholeAndNeverOverAnother) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::report_test

@@ -12,7 +12,7 @@
 #include "tests/pipeline/night_frames.h"
 #include "tests/support/executors.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::clean_raw_test {
 namespace {
 
 using denoise::Level;
@@ -238,4 +238,4 @@ TEST(ResidualProfile, NeverFallsAndNeverStartsBelowZero) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::clean_raw_test

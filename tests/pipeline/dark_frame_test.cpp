@@ -8,7 +8,7 @@
 #include "tests/support/frames.h"
 #include "tests/support/raw_frames.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::dark_frame_test {
 namespace {
 
 constexpr int width = 62, height = 46;
@@ -180,4 +180,4 @@ TEST(DevelopWithDarkFrame, ADarkOfAnotherSizeIsAnError) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::dark_frame_test

@@ -18,7 +18,7 @@
 #include "tests/support/executors.h"
 #include "tests/support/raw_frames.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::float_frame_test {
 namespace {
 
 using denoise::Level;
@@ -374,4 +374,4 @@ TEST(WideRange, DenoisingKeepsTheMeanOfShadowsAndTheColourOfLampsOver24Ev) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::float_frame_test

@@ -17,7 +17,7 @@
 #include "isp/render/output_space.h"
 #include "tests/pipeline/night_frames.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::look_test {
 namespace {
 
 constexpr int width = 192, height = 128;
@@ -504,4 +504,4 @@ TEST(StatedLight, RefusesDegreesThatAreNone) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::look_test

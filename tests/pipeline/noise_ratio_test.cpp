@@ -23,7 +23,7 @@
 #include "tests/pipeline/mixed_night.h"
 #include "tests/support/executors.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::noise_ratio_test {
 namespace {
 
 using denoise::Level;
@@ -230,4 +230,4 @@ TEST(NoiseRatioPlan, CleanRawsHaveNone) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::noise_ratio_test

@@ -14,7 +14,7 @@
 #include "tests/pipeline/night_frames.h"
 #include "tests/support/executors.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::noise_reduction_test {
 namespace {
 
 using denoise::Level;
@@ -381,4 +381,4 @@ TEST(NoiseReduction, FramesOfAFewPixelsAreDeveloped) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::noise_reduction_test

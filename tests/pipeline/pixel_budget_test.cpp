@@ -14,7 +14,7 @@
 #include "tests/support/executors.h"
 #include "tests/support/reference_cost.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::pixel_budget_test {
 namespace {
 
 using denoise::Level;
@@ -128,4 +128,4 @@ TEST(PixelBudgets, TheVisibleNoiseIsThatOfAllSamples) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::pixel_budget_test

@@ -20,7 +20,7 @@
 #include "tests/support/executors.h"
 
 // Noise reduction of frames that are no mosaics.
-namespace lowlux::isp {
+namespace lowlux::isp::pixel_noise_test {
 namespace {
 
 using denoise::Level;
@@ -332,4 +332,4 @@ TEST(PixelNoise, OfTheImageIsThatWhichIsLeft) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::pixel_noise_test

@@ -18,7 +18,7 @@
 #include "tests/support/frame_sizes.h"
 
 /// Every way through the pipeline against reference::developed, one stage after the other.
-namespace lowlux::isp {
+namespace lowlux::isp::render_path_test {
 namespace {
 
 using test::FrameSize;
@@ -249,4 +249,4 @@ TEST(RenderPath, CleanRawsHoldTheSignalOfTheReference) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::render_path_test

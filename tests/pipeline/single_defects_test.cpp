@@ -20,7 +20,7 @@
 #include "tests/support/executors.h"
 #include "tests/support/reference_cost.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::single_defects_test {
 namespace {
 
 using test::two_threads;
@@ -211,4 +211,4 @@ TEST(SingleDefects, TheirStatedSizeIsTheirContrastInTheImage) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::single_defects_test

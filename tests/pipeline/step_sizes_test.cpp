@@ -24,7 +24,7 @@
 #include "tests/support/executors.h"
 #include "tests/support/reference_cost.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::step_sizes_test {
 namespace {
 
 using test::two_threads;
@@ -179,4 +179,4 @@ TEST(StepSizes, LinesLeftOutForLackOfTimeAreStatedWithTheirSize) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::step_sizes_test

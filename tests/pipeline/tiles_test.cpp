@@ -12,7 +12,7 @@
 #include "tests/support/count_allocations.h"
 #include "tests/support/executors.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::tiles_test {
 namespace {
 
 using denoise::Level;
@@ -444,4 +444,4 @@ TEST(PipelineMemory, IsAtMostFortyBytesPerPixelAndOneGibibyteAtAHundredMegapixel
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::tiles_test

@@ -15,7 +15,7 @@
 #include "isp/raw/to_linear.h"
 #include "tests/properties/draws.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::raw_properties_test {
 namespace {
 
 using namespace properties;
@@ -232,4 +232,4 @@ RC_GTEST_PROP(ThumbnailProperty, OfAnEvenFrameIsThatLightEverywhere, ()) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::raw_properties_test

@@ -14,7 +14,7 @@
 
 // How many defects one picture tells, and that no star is taken for one. Electrons, Poisson; 0.8 DN/e-, read noise 2
 // e-.
-namespace lowlux::isp {
+namespace lowlux::isp::defect_statistics_test {
 namespace {
 
 constexpr int side = 512;
@@ -159,4 +159,4 @@ TEST(DefectStatistics, NoStarOfOneAndAHalfPixelsIsTakenForADefect) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::defect_statistics_test

@@ -14,7 +14,7 @@
 #include "isp/raw/black_point.h"
 #include "tests/support/guarded_memory.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::frame_meter_test {
 namespace {
 
 struct Sensor {
@@ -210,4 +210,4 @@ TEST(FrameMeter, ReadsNothingBeyondTheLastRow) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::frame_meter_test

@@ -11,7 +11,7 @@
 
 #include "tests/support/frames.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::saturation_level_test {
 namespace {
 
 using Rgb = std::array<double, 3>;
@@ -283,4 +283,4 @@ TEST(SaturationLevel, IsThatOfMosaicsOfCodes) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::saturation_level_test

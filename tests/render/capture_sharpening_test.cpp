@@ -12,7 +12,7 @@
 
 #include "tests/support/executors.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::capture_sharpening_test {
 namespace {
 
 constexpr int width = 192, height = 160;
@@ -275,4 +275,4 @@ TEST(CaptureSharpening, ThreadsChangeNothing) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::capture_sharpening_test

@@ -10,7 +10,7 @@
 
 #include "tests/support/sweep.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::exposure_test {
 namespace {
 
 /// `bright` of 1000 blocks hold `highlight`, the others `level`.
@@ -151,4 +151,4 @@ TEST(ExposureRules, HaveDistinctNames) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::exposure_test

@@ -12,7 +12,7 @@
 
 #include "tests/support/executors.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::local_tone_test {
 namespace {
 
 constexpr unsigned seed = 20261126;
@@ -337,4 +337,4 @@ TEST(LocalTone, AnyFiniteLightGivesFiniteLight) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::local_tone_test

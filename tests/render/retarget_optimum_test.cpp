@@ -11,7 +11,7 @@
 #include "isp/model/colour/colorimetry.h"
 #include "isp/render/output_space.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::retarget_optimum_test {
 namespace {
 
 Xyz white() { return xyz_of(*rgb_to_xyz(primaries_rec709) * Vector3{1, 1, 1}); }
@@ -176,4 +176,4 @@ TEST(ClosestDisplayable, CodesBeyondTheCubeCountAsTheNearest) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::retarget_optimum_test

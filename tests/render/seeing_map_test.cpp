@@ -12,7 +12,7 @@
 #include "isp/base/executor.h"
 #include "isp/model/vision/detection.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::seeing_map_test {
 namespace {
 
 constexpr std::array<float, 9> as_it_is{1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -90,4 +90,4 @@ TEST(SeeingMap, IsAProbabilityForAnyLightAndTheSameWithAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::seeing_map_test

@@ -11,7 +11,7 @@
 #include "isp/render/output_space.h"
 #include "tests/support/sweep.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::tone_test {
 namespace {
 
 std::vector<double> limits() {
@@ -223,4 +223,4 @@ TEST(ToneTable, EndsAreExactAndTheTableRises) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::tone_test

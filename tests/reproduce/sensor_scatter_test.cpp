@@ -7,7 +7,7 @@
 
 #include "isp/metrics/statistics.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::sensor_scatter_test {
 namespace {
 
 const ThesisCamera& camera() {
@@ -48,4 +48,4 @@ TEST(SensorScatter, DeltaEWithDarkCurrentIsThatOfAnIndependentProgram) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::sensor_scatter_test

@@ -9,7 +9,7 @@
 
 #include "isp/reproduce/reproduce.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::thesis_findings_test {
 namespace {
 
 // Findings of either kind that do not hold, and why: their notes say the same. All others do.
@@ -161,4 +161,4 @@ TEST(PublishedExperiments, AreFoundByTheirIdsAndNearOnesAreNamed) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::thesis_findings_test

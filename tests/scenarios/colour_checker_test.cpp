@@ -12,7 +12,7 @@
 #include "isp/model/colour/colour_difference.h"
 #include "tests/support/synthetic_chart.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::colour_checker_test {
 namespace {
 
 /// Returns the CIEDE2000 of the 24 patches: camera RGB through a matrix to XYZ under D65, against the scene's XYZ
@@ -155,4 +155,4 @@ TEST(ColourChecker, GreysStayGrey) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::colour_checker_test

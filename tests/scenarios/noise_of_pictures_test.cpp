@@ -10,7 +10,7 @@
 #include "tests/sensor_bench/picture_raw.h"
 #include "tests/support/executors.h"
 
-namespace lowlux {
+namespace lowlux::noise_of_pictures_test {
 namespace {
 
 using test::two_threads;
@@ -76,4 +76,4 @@ TEST(NoiseOfPictures, TellsAGainThatIsOffByFourFromOneThatIsRight) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::noise_of_pictures_test

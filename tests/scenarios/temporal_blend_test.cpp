@@ -17,7 +17,7 @@
 #include "tests/denoise/frames.h"
 #include "tests/sensor_bench/picture_raw.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::temporal_blend_test {
 namespace {
 
 constexpr double gain_dn_per_e = 4, black_dn = 400, read_noise_e = 2, read_e2 = read_noise_e * read_noise_e;
@@ -341,4 +341,4 @@ TEST(TemporalBlend, OtherLimitsOfDetailAreNotBetterByAQuarterDecibel) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::temporal_blend_test

@@ -8,7 +8,7 @@
 
 #include "capture/libcamera/start_controls.h"
 
-namespace lowlux::capture {
+namespace lowlux::capture::libcamera_facts_test {
 namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -206,4 +206,4 @@ TEST(ExposureSettings, HoldTheFrameThatTheExposureTakes) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::libcamera_facts_test

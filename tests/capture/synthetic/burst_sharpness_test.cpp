@@ -5,7 +5,7 @@
 
 #include "tests/capture/synthetic/burst_scene.h"
 
-namespace lowlux::capture {
+namespace lowlux::capture::burst_sharpness_test {
 namespace {
 
 using test::burst_of;
@@ -116,4 +116,4 @@ TEST(BurstSharpness, TheTestSeesWhatInterpolationLoses) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::burst_sharpness_test

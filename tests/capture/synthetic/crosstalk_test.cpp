@@ -15,7 +15,7 @@
 #include "tests/support/sensor_frames.h"
 
 // Crosstalk of simulated frames against its kernel, in frames of drawn sizes.
-namespace lowlux::capture {
+namespace lowlux::capture::crosstalk_test {
 namespace {
 
 using isp::Effect;
@@ -268,4 +268,4 @@ TEST(Crosstalk, IsSimulatedOnlyInTheBlocksThatShowIt) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::crosstalk_test

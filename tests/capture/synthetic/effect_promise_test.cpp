@@ -21,7 +21,7 @@
 
 // The planner's promise: a frame simulated with the effects it chose differs from the frame with all effects, made of
 // the same random numbers, by less than the tolerance, in the colour of block means and in the variance of blocks.
-namespace lowlux::capture {
+namespace lowlux::capture::effect_promise_test {
 namespace {
 
 constexpr int blocks_across = 4, blocks_down = 3;
@@ -328,4 +328,4 @@ TEST(EffectPromise, NoBlockChangesByMoreThanIsPredictedOfLightThatMoves) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::effect_promise_test

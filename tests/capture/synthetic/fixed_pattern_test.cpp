@@ -11,7 +11,7 @@
 #include "tests/support/sensor_frames.h"
 
 // Fixed patterns and banding of simulated flats: standard deviations against the sensor's figures.
-namespace lowlux::capture {
+namespace lowlux::capture::fixed_pattern_test {
 namespace {
 
 using isp::Effect;
@@ -233,4 +233,4 @@ TEST(FixedPattern, PatternsOfOneSeedAreIndependentOfEachOther) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::fixed_pattern_test

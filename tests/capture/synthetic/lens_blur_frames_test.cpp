@@ -14,7 +14,7 @@
 #include "tests/support/sensor_frames.h"
 
 // The blur of the lens in frames, in their truth and in their plan.
-namespace lowlux::capture {
+namespace lowlux::capture::lens_blur_frames_test {
 namespace {
 
 using isp::Effect;
@@ -160,4 +160,4 @@ TEST(LensBlurFrames, ImpossibleBlursAreRefused) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::lens_blur_frames_test

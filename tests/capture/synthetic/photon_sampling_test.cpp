@@ -14,7 +14,7 @@
 #include "tests/support/synthetic_camera.h"
 
 // Physical photon sampling has the variance sum x_i Qe_i, published sampling sum x_i Qe_i^2; both have the same mean.
-namespace lowlux::capture {
+namespace lowlux::capture::photon_sampling_test {
 namespace {
 
 using isp::Effect;
@@ -167,4 +167,4 @@ TEST(PhotonSampling, PublishedRefusesMorePhotonsInABinThanTheSamplerCounts) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::photon_sampling_test

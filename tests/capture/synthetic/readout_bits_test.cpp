@@ -10,7 +10,7 @@
 #include "capture/synthetic/readout.h"
 #include "tests/support/draw_bits.h"
 
-namespace lowlux::capture {
+namespace lowlux::capture::readout_bits_test {
 namespace {
 
 constexpr DrawStream stream{.seed = 0xfedcba9876543210, .frame = 9, .purpose = draw_purpose::electrons};
@@ -119,4 +119,4 @@ TEST(ReadoutBits, ChargesThatAreNoNumberGiveTheCodeZero) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::readout_bits_test

@@ -13,7 +13,7 @@
 #include "tests/support/sensor_frames.h"
 #include "tests/support/synthetic_camera.h"
 
-namespace lowlux::capture {
+namespace lowlux::capture::synthetic_source_test {
 namespace {
 
 using isp::Effect;
@@ -300,4 +300,4 @@ TEST(SyntheticSource, MeansBeyondTheSamplerAreRefusedWhereNothingHoldsThem) {
 }
 
 }  // namespace
-}  // namespace lowlux::capture
+}  // namespace lowlux::capture::synthetic_source_test

@@ -18,7 +18,7 @@
 #include "tests/support/process.h"
 #include "tests/support/scratch_directory.h"
 
-namespace lowlux {
+namespace lowlux::exif_blocks_test {
 namespace {
 
 using test::Tag;
@@ -258,4 +258,4 @@ TEST(ExifBlocks, ExiftoolReadsTheSameTagsFromTheDngThatTheyArePassedOnTo) {
 }
 
 }  // namespace
-}  // namespace lowlux
+}  // namespace lowlux::exif_blocks_test

@@ -18,7 +18,7 @@
 #include "tests/support/frames.h"
 #include "tests/support/scratch_directory.h"
 
-namespace lowlux::cli {
+namespace lowlux::cli::noise_source_test {
 namespace {
 
 using Source = NoiseOrigin::Source;
@@ -249,4 +249,4 @@ TEST_F(NoiseSourceOrder, IsNearTheTruthOnSimulatedSensors) {
 }
 
 }  // namespace
-}  // namespace lowlux::cli
+}  // namespace lowlux::cli::noise_source_test

@@ -11,7 +11,7 @@
 #include "isp/pipeline/plan/plan_develop.h"
 #include "tests/pipeline/night_frames.h"
 
-namespace lowlux::cli {
+namespace lowlux::cli::profile_option_test {
 namespace {
 
 constexpr int border = 64, side = 256;
@@ -126,4 +126,4 @@ TEST(ProfileOption, FramesOfOneCameraAreAddedUnderEitherOfItsNames) {
 }
 
 }  // namespace
-}  // namespace lowlux::cli
+}  // namespace lowlux::cli::profile_option_test

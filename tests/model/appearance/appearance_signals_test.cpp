@@ -14,7 +14,7 @@
 
 // The equations of each model against figures computed apart in numpy; a tolerance is half of the last digit printed
 // there, unless it says otherwise.
-namespace lowlux::isp {
+namespace lowlux::isp::appearance_signals_test {
 namespace {
 
 constexpr Matrix3 srgb_to_xyz{{{0.4124, 0.3576, 0.1805}, {0.2126, 0.7152, 0.0722}, {0.0193, 0.1192, 0.9505}}};
@@ -273,4 +273,4 @@ TEST(Icam06, CompatibilityWithTheProgramIsItsThreeDifferences) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::appearance_signals_test

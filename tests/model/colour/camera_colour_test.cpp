@@ -9,7 +9,7 @@
 #include "isp/model/colour/correlated_colour_temperature.h"
 #include "tests/support/sweep.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::camera_colour_test {
 namespace {
 
 // Two made-up but camera-like calibrations.
@@ -302,4 +302,4 @@ TEST(CameraColour, RefusesWhatItCannotUse) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::camera_colour_test

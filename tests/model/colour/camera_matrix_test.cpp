@@ -13,7 +13,7 @@
 #include "isp/model/spectrum/cie_data.h"
 #include "isp/model/spectrum/spectral_data.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::camera_matrix_test {
 namespace {
 
 /// Sensitivities that are sums of colour-matching functions: rows of `map` times x, y, z.
@@ -143,4 +143,4 @@ TEST(FitCalibration, RefusesDarkLightsAndDependentSensitivities) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::camera_matrix_test

@@ -11,7 +11,7 @@
 #include "isp/model/spectrum/spectral_data.h"
 #include "tests/support/numbers.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::max_entropy_test {
 namespace {
 
 using test::inf;
@@ -201,4 +201,4 @@ TEST(MaxEntropy, RefusesWhatIsNotANumberAndAGammaTooSmall) {
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::max_entropy_test

@@ -13,7 +13,7 @@
 #include "isp/merge/exposure.h"
 #include "tests/pipeline/merge/merge_bursts.h"
 
-namespace lowlux::isp {
+namespace lowlux::isp::bracket_scene_test {
 namespace {
 
 using test::Burst;
@@ -172,4 +172,4 @@ TEST(BracketScene, FramesTakenAsAdvisedReachThePredictedRatioAndHoldTheHighlight
 }
 
 }  // namespace
-}  // namespace lowlux::isp
+}  // namespace lowlux::isp::bracket_scene_test
