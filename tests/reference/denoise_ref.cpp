@@ -27,6 +27,8 @@ struct Frame {
   std::array<double, 4> dark_e, gain, variance_e2;
   double most_ratio = 0;
   double offset_e = 0;  // c of h(x), see below
+  Four value;           // of each cell's sites
+  Four sum_of_nine;     // along a row, of the values around each
 
   Frame(const RawElectronsView& r, const RawNoise& n, const DenoiseOptions& o)
       : raw(r), noise(n), options(o), site(sites_of(r.phase)) {
@@ -48,6 +50,21 @@ struct Frame {
       offset_e = std::max(
           offset_e, gain[k] * (10 * std::max(most_ratio, 1.0) + 2 * most_ratio * scale * (dark_e[k] + variance_e2[k])));
     }
+    for (int k = 0; k < 4; ++k) set_values(k);
+  }
+
+  void set_values(int k) {
+    value[k] = sum_of_nine[k] = Image(columns, rows);
+    for (int cy = 0; cy < rows; ++cy) {
+      for (int cx = 0; cx < columns; ++cx) {
+        const float e =
+            raw.value.at(raw_of(cx, site[k] & 1, raw.value.width), raw_of(cy, site[k] >> 1, raw.value.height));
+        value[k].at(cx, cy) = std::isnan(e) ? 0 : std::clamp(static_cast<double>(e), -1e9, 1e9);
+      }
+      for (int cx = 0; cx < columns; ++cx) {
+        for (int i = -4; i <= 4; ++i) sum_of_nine[k].at(cx, cy) += y(k, cx + i, cy);
+      }
+    }
   }
 
   // h(x) = 2 c (sqrt(1 + x / c) - 1), below x = -c / 2 its tangent there.
@@ -62,9 +79,7 @@ struct Frame {
   double slope(double u) const { return std::max(1 + u / (2 * offset_e), std::sqrt(0.5)); }  // of light(u)
 
   double y(int k, int cell_x, int cell_y) const {
-    const int cx = mirrored(cell_x, columns), cy = mirrored(cell_y, rows);
-    const float e = raw.value.at(raw_of(cx, site[k] & 1, raw.value.width), raw_of(cy, site[k] >> 1, raw.value.height));
-    return std::isnan(e) ? 0 : std::clamp(static_cast<double>(e), -1e9, 1e9);
+    return value[k].at(mirrored(cell_x, columns), mirrored(cell_y, rows));
   }
 
   bool saturated(int k, int cell_x, int cell_y) const {
@@ -86,10 +101,8 @@ struct Frame {
   double mean(int k, int cell_x, int cell_y) const {
     double sum = 0;
     for (int j = -4; j <= 4; ++j) {
-      for (int i = -4; i <= 4; ++i) {
-        sum += k == 1 || k == 2 ? (y(1, cell_x + i, cell_y + j) + y(2, cell_x + i, cell_y + j)) / 2
-                                : y(k, cell_x + i, cell_y + j);
-      }
+      const int cx = mirrored(cell_x, columns), cy = mirrored(cell_y + j, rows);
+      sum += k == 1 || k == 2 ? (sum_of_nine[1].at(cx, cy) + sum_of_nine[2].at(cx, cy)) / 2 : sum_of_nine[k].at(cx, cy);
     }
     return sum / 81;
   }

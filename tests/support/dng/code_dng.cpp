@@ -22,16 +22,13 @@ std::vector<std::byte> stored(std::vector<std::uint32_t> row, const CodeStore& h
     for (const std::uint32_t code : row) writer.number(code, 2);
     return writer.out;
   }
-  std::vector<bool> bits;
+  std::uint64_t bits = 0;  // of which the last `count` are not written yet
+  int count = 0;
   for (const std::uint32_t code : row) {
-    for (int bit = how.bits - 1; bit >= 0; --bit) bits.push_back((code >> bit & 1) != 0);
+    bits = bits << how.bits | (code & mask);
+    for (count += how.bits; count >= 8; count -= 8) writer.number(bits >> (count - 8) & 255, 1);
   }
-  while (bits.size() % 8 != 0) bits.push_back(false);
-  for (std::size_t i = 0; i < bits.size(); i += 8) {
-    std::uint32_t byte = 0;
-    for (std::size_t bit = 0; bit < 8; ++bit) byte = byte << 1 | (bits[i + bit] ? 1U : 0U);
-    writer.number(byte, 1);
-  }
+  if (count > 0) writer.number(bits << (8 - count) & 255, 1);
   return writer.out;
 }
 
