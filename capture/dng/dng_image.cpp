@@ -9,7 +9,6 @@
 #include "capture/dng/dng_lossy.h"
 #include "capture/dng/dng_rows.h"
 #include "capture/dng/dng_tags.h"
-#include "capture/dng/jpeg_strips.h"
 #include "capture/file/pass_on.h"
 #include "isp/base/text.h"
 
@@ -18,10 +17,10 @@ namespace {
 
 constexpr std::uint32_t max_size = 65535;
 
-tl::unexpected<Error> wrong_size(std::int64_t width, std::int64_t height, int min_side, std::int64_t max_side) {
+tl::unexpected<Error> wrong_size(std::uint32_t width, std::uint32_t height) {
   return fail(ErrorCode::malformed, "a raw image of " + std::to_string(width) + " x " + std::to_string(height) +
-                                        " pixels cannot be decoded, " + std::to_string(min_side) + " to " +
-                                        std::to_string(max_side) + " each way can");
+                                        " pixels cannot be decoded, 1 to " + std::to_string(max_size) +
+                                        " each way can");
 }
 
 /// Returns whether the samples are floating-point numbers.
@@ -135,16 +134,8 @@ Result<void> check_tile_count(const TiffDirectory& directory, const DngImage& im
   return check_part_count(image, count(image.width, *width) * count(image.height, *height), parts);
 }
 
-/// Checks that lossless JPEG is stored as LibRaw reads it: in a classic TIFF, in tiles or strips that it can take for
-/// tiles (jpeg_strips.h), of an image that it does not take for a thumbnail.
+/// Checks that lossless JPEG for LibRaw is inside the file and complete.
 Result<void> check_lossless_jpeg(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
-  if (directory.is_big_tiff) {
-    return fail(ErrorCode::unsupported,
-                "lossless JPEG in a BigTIFF is not supported: convert it to a DNG below 4 GB, or without compression",
-                tag::compression.name);
-  }
-  if (!is_libraw_size(image)) return wrong_size(image.width, image.height, min_libraw_side, max_libraw_side);
-  if (is_jpeg_in_strips(directory)) return check_jpeg_strips(directory, image, file_bytes);
   return dng_parts(directory, file_bytes).and_then([&](const DngParts& parts) {
     return check_tile_count(directory, image, parts);
   });
@@ -156,9 +147,8 @@ Result<DngDecoder> decoder_of(const TiffDirectory& directory, const DngImage& im
   if (image.is_float || is_deflate(*compression)) return DngDecoder::rows;
   switch (*compression) {
     case tag::compression_none:
-      return is_for_libraw(directory, image, file_bytes) ? DngDecoder::libraw : DngDecoder::rows;
     case tag::compression_jpeg:
-      return DngDecoder::libraw;
+      return is_for_libraw(directory, image, file_bytes) ? DngDecoder::libraw : DngDecoder::rows;
     case tag::compression_lossy_jpeg:
       return DngDecoder::lossy_jpeg;
     case tag::compression_jpeg_xl:
@@ -176,9 +166,10 @@ Result<DngDecoder> decoder_of(const TiffDirectory& directory, const DngImage& im
 /// Checks that the image data are inside the file and stored as their decoder reads them.
 Result<void> check_storage(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
   if (image.is_planar && image.decoder != DngDecoder::rows) {
-    return fail(ErrorCode::unsupported,
-                "images stored colour after colour are supported without compression or with Deflate only",
-                tag::planar_configuration.name);
+    return fail(
+        ErrorCode::unsupported,
+        "images stored colour after colour are supported without compression, in lossless JPEG or with Deflate only",
+        tag::planar_configuration.name);
   }
   switch (image.decoder) {
     case DngDecoder::rows:
@@ -252,8 +243,7 @@ Result<DngImage> dng_image(const TiffDirectory& directory, std::size_t file_byte
   if (!samples) return pass_on(samples);
   auto is_float = holds_floats(directory);
   if (!is_float) return pass_on(is_float);
-  if (std::min(*width, *height) < 1 || std::max(*width, *height) > max_size)
-    return wrong_size(*width, *height, 1, max_size);
+  if (std::min(*width, *height) < 1 || std::max(*width, *height) > max_size) return wrong_size(*width, *height);
   DngImage image;
   image.is_float = *is_float;
   image.width = static_cast<int>(*width);

@@ -10,6 +10,7 @@
 #include "capture/file/pass_on.h"
 #include "isp/codec/code_rows.h"
 #include "isp/codec/float_rows.h"
+#include "isp/codec/lossless_jpeg_rows.h"
 
 namespace lowlux::capture {
 namespace {
@@ -19,7 +20,8 @@ struct RowParts {
   isp::RowStorage storage;
   int pixel_samples = 1;        // of a pixel, in a part
   std::size_t row_samples = 0;  // in a row of a part
-  std::size_t row_bytes = 0;    // of a row of a part
+  std::size_t row_bytes = 0;    // of a row of a part; in lossless JPEG at least
+  bool is_jpeg = false;         // lossless, of integers
 };
 
 /// Returns the rows of the image in part i.
@@ -54,12 +56,17 @@ Result<int> predictor_factor(const TiffDirectory& directory, const DngImage& ima
   return 1 << (at - std::begin(known));
 }
 
+bool is_jpeg(const TiffDirectory& directory, const DngImage& image) {
+  const auto compression = directory.whole_or(tag::compression, tag::compression_none);
+  return compression && *compression == tag::compression_jpeg && !image.is_float;
+}
+
 /// @param pixel_samples  of a pixel, in a part
 Result<isp::RowStorage> storage_of(const TiffDirectory& directory, const DngImage& image, int pixel_samples) {
   auto compression = directory.whole_or(tag::compression, tag::compression_none);
   if (!compression) return pass_on(compression);
   isp::RowStorage storage{.bits = image.bits, .big_endian = directory.big_endian};
-  if (*compression == tag::compression_none) return storage;
+  if (*compression == tag::compression_none || is_jpeg(directory, image)) return storage;
   if (!is_deflate(*compression)) {
     return unsupported("the floating-point image is compressed with " + compression_name(*compression) +
                            ", which is not supported: convert it to a DNG with Deflate or no compression",
@@ -97,8 +104,11 @@ Result<RowParts> row_parts(const TiffDirectory& directory, const DngImage& image
   parts.storage = *storage;
   parts.grid = *std::move(grid);
   parts.row_samples = static_cast<std::size_t>(parts.grid.width) * static_cast<std::size_t>(parts.pixel_samples);
-  parts.row_bytes = image.is_float ? isp::FloatRows::row_bytes(image.bits, parts.row_samples)
-                                   : isp::CodeRows::row_bytes(image.bits, parts.row_samples);
+  parts.is_jpeg = is_jpeg(directory, image);
+  constexpr int min_jpeg_bits = 1;  // of a sample
+  parts.row_bytes = image.is_float
+                        ? isp::FloatRows::row_bytes(image.bits, parts.row_samples)
+                        : isp::CodeRows::row_bytes(parts.is_jpeg ? min_jpeg_bits : image.bits, parts.row_samples);
   if (auto lengths = check_lengths(parts, image); !lengths) return pass_on(lengths);
   return parts;
 }
@@ -116,6 +126,15 @@ bool are_full(const RowParts& parts) {
   const double bytes = static_cast<double>(parts.row_bytes) * parts.grid.height;
   const auto& stored = parts.grid.at.bytes;
   return std::all_of(stored.begin(), stored.end() - 1, [bytes](double of_part) { return of_part == bytes; });
+}
+
+/// Returns whether LibRaw decodes lossless JPEG in these parts: one strip, or tiles that are not wider than the image,
+/// whose rows it would shift, nor of a monochrome image, of which it takes one component only.
+bool is_jpeg_for_libraw(const TiffDirectory& directory, const DngImage& image, const DngParts& parts) {
+  if (!parts.tiled) return parts.offset.size() == 1;
+  const auto image_width = static_cast<std::uint32_t>(image.width);
+  const auto width = directory.whole_or(tag::tile_width, image_width);  // as LibRaw takes it
+  return image.layout != SensorLayout::monochrome && (!width || *width <= image_width);
 }
 
 template <class Rows, class Sample>
@@ -155,6 +174,7 @@ Result<void> check_row_image(const TiffDirectory& directory, const DngImage& ima
 bool is_for_libraw(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
   if (directory.is_big_tiff || image.is_planar || !is_libraw_size(image)) return false;
   const auto strips = dng_parts(directory, file_bytes);
+  if (is_jpeg(directory, image)) return !strips || is_jpeg_for_libraw(directory, image, *strips);
   if (!strips || strips->tiled || !are_adjacent(*strips)) return false;
   const std::size_t row_samples = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.samples);
   const double needed = static_cast<double>(isp::CodeRows::row_bytes(image.bits, row_samples)) * image.height;
@@ -165,6 +185,7 @@ bool is_for_libraw(const TiffDirectory& directory, const DngImage& image, std::s
 
 Result<Plane<std::uint16_t>> decode_code_image(std::span<const std::byte> file, const TiffDirectory& directory,
                                                const DngImage& image) {
+  if (is_jpeg(directory, image)) return decode<isp::LosslessJpegRows, std::uint16_t>(file, directory, image);
   return decode<isp::CodeRows, std::uint16_t>(file, directory, image);
 }
 

@@ -9,17 +9,18 @@
 #include "isp/base/plane.h"
 #include "isp/base/result.h"
 
-/// Images whose strips or tiles are uncompressed or deflated are read here: integers of 8 to 16 bits that LibRaw would
-/// misplace or not decode (is_for_libraw), and floating-point numbers of 16, 24 and 32 bits, which LibRaw converts to
-/// 14-bit codes. Predictors, and images stored colour after colour, are supported.
+/// Images whose strips or tiles are uncompressed, deflated or in lossless JPEG are read here: integers of 8 to 16 bits
+/// that LibRaw would misplace or not decode (is_for_libraw), and floating-point numbers of 16, 24 and 32 bits, which
+/// LibRaw converts to 14-bit codes. Predictors, and images stored colour after colour, are supported.
 namespace lowlux::capture {
 
 /// Returns the error of an image whose storage is not supported or contradicts itself, or whose data are too short for
 /// its pixels. It allocates no memory for pixels.
 Result<void> check_row_image(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes);
 
-/// Returns whether LibRaw 0.20 reads this uncompressed image of integers: row after row without a gap, in a classic
-/// TIFF, 22 to 64,000 pixels wide and high, and not in tiles.
+/// Returns whether LibRaw 0.20 reads this image of integers, uncompressed or in lossless JPEG: in a classic TIFF, 22 to
+/// 64,000 pixels wide and high; uncompressed row after row without a gap and not in tiles; JPEG in one strip, or in
+/// tiles of a coloured image that are not wider than the image.
 bool is_for_libraw(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes);
 
 /// Both decode an image that check_row_image accepts, to height x (width * samples).

@@ -17,7 +17,6 @@
 #include "capture/dng/dng_lossy.h"
 #include "capture/dng/dng_rows.h"
 #include "capture/dng/dng_tags.h"
-#include "capture/dng/jpeg_strips.h"
 #include "capture/dng/source_tags.h"
 #include "capture/dng/tiff_directory.h"
 #include "capture/file/decoder_frame.h"
@@ -116,17 +115,12 @@ std::vector<const TiffEntry*> harmful_tags(const DngFile& dng) {
   return found;
 }
 
-Result<DecodedRaw> decode_dng(const DngFile& dng, const DngDescription& described, std::span<const std::byte> bytes,
-                              const ReadLimits& limits) {
+/// Decodes a copy of the file in which harmful tags have the number 0, which hides them.
+Result<DecodedRaw> decode_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits) {
   const auto harmful = harmful_tags(dng);
-  const bool in_strips = is_jpeg_in_strips(*described.directory);
-  if (harmful.empty() && !in_strips) return decode_contained(bytes, limits);
+  if (harmful.empty()) return decode_contained(bytes, limits);
   std::vector<std::byte> changed(bytes.begin(), bytes.end());
-  for (const TiffEntry* entry : harmful) set_tag(*entry, 0, changed);
-  if (in_strips) {
-    auto presented = present_strips_as_tiles(*described.directory, described.image, changed);
-    if (!presented) return pass_on(presented);
-  }
+  for (const TiffEntry* entry : harmful) std::fill_n(changed.begin() + entry->place, 2, std::byte{0});
   return decode_contained(changed, limits);
 }
 
@@ -176,7 +170,7 @@ Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, 
     case DngDecoder::libraw:
       break;
   }
-  auto decoded = decode_dng(dng, *described, bytes, limits);
+  auto decoded = decode_dng(dng, bytes, limits);
   if (!decoded) return pass_on(decoded);
   return complete_dng(dng, *std::move(described), bytes.size(), *std::move(decoded), use);
 }

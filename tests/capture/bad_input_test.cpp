@@ -177,15 +177,6 @@ TEST(BadInput, AbsurdDimensionsAreRefusedWithoutTakingTheirMemory) {
   EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 64 << 10) << "KiB";
 }
 
-TEST(BadInput, SmallImagesThatTheDecoderDoesNotTakeAreRefusedBySize) {
-  DngBuilder dng;
-  dng.width = 21;
-  EXPECT_EQ(samples_of(read_built(dng)), ramp(dng));  // uncompressed ones are read without it
-  dng.storage = DngStorage::lossless_jpeg;
-  dng.jpeg_components = 1;
-  EXPECT_TRUE(has(refused(dng), "21 x 24 pixels cannot be decoded, 22 to 64000"));
-}
-
 TEST(BadInput, FewerTilesOfLosslessJpegThanTheImageNeedsAreRefused) {
   DngBuilder dng;
   dng.storage = DngStorage::tiled_lossless_jpeg;

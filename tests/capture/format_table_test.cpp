@@ -122,6 +122,7 @@ std::vector<Format> stored_formats() {
   out.push_back(
       {"DNG, LinearRaw, 8 bits, Deflate", [] { return stored({.bits = 8, .samples = 3, .deflate = true}).build(); }});
   out.push_back({"DNG, BigTIFF, uncompressed", [] { return in_big_tiff(plain()); }});
+  out.push_back({"DNG, BigTIFF, lossless JPEG", [] { return in_big_tiff(plain(1, 14, DngStorage::lossless_jpeg)); }});
   out.push_back({"DNG, LinearRaw, lossless JPEG", [] { return plain(3, 16, DngStorage::lossless_jpeg).build(); }});
 #ifdef LOWLUX_WITH_JPEG_XL
   out.push_back({"DNG, Bayer, JPEG XL", [] { return in_jpeg_xl(1); }});
@@ -135,7 +136,6 @@ std::vector<Format> stored_formats() {
 
 std::vector<Format> other_formats() {
   return {{"DNG, Bayer, lossy JPEG", [] { return with(plain(1, 8), 259, {34892}); }},
-          {"DNG, BigTIFF, lossless JPEG", [] { return in_big_tiff(plain(1, 14, DngStorage::lossless_jpeg)); }},
           {"DNG, VC-5 (GoPro GPR)", [] { return file_of("gopro_hero6_GOPR0024.gpr"); }},
           {"DNG, mosaic of 6 x 6 sites other than X-Trans",
            [] {
@@ -155,8 +155,6 @@ std::vector<Format> other_formats() {
            }},
           {"DNG, mosaic that is not rectangular", [] { return with(plain(), 50711, {2}); }},
           {"DNG, integers of 32 bits", [] { return with(plain(), 258, {32}); }},
-          {"DNG, LinearRaw, lossless JPEG, colour after colour",
-           [] { return with(plain(3, 16, DngStorage::lossless_jpeg), 284, {2}); }},
           {"Kodak C603, YCbCr without a header", [] { return dump(9116448); }},
           {"text", [] { return dump(1000); }},
           {"TIFF image", [] { return with(plain(3).remove(50706).remove(50707), 262, {2}); }},
