@@ -137,6 +137,13 @@ bool is_jpeg_for_libraw(const TiffDirectory& directory, const DngImage& image, c
   return image.layout != SensorLayout::monochrome && (!width || *width <= image_width);
 }
 
+/// Returns the error of part i, which is damaged.
+tl::unexpected<Error> undecodable(const DngGrid& grid, std::size_t i) {
+  return fail(ErrorCode::malformed, "the samples from column " + std::to_string(grid.left(i)) + ", row " +
+                                        std::to_string(grid.top(i)) +
+                                        " on do not decode: the file is truncated or damaged");
+}
+
 template <class Rows, class Sample>
 Result<Plane<Sample>> decode(std::span<const std::byte> file, const TiffDirectory& directory, const DngImage& image) {
   auto parts = row_parts(directory, image, file.size());
@@ -159,8 +166,7 @@ Result<Plane<Sample>> decode(std::span<const std::byte> file, const TiffDirector
       }
     }
     if (good && rows.ends_within(grid.height - rows_in(*parts, image, i))) continue;
-    return fail(ErrorCode::malformed, "the samples from column " + std::to_string(x) + ", row " + std::to_string(y) +
-                                          " on do not decode: the file is truncated or damaged");
+    return undecodable(grid, i);
   }
   return out;
 }
@@ -169,6 +175,20 @@ Result<Plane<Sample>> decode(std::span<const std::byte> file, const TiffDirector
 
 Result<void> check_row_image(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
   return row_parts(directory, image, file_bytes).map([](const RowParts& /*parts*/) {});
+}
+
+Result<void> check_jpeg_samples(std::span<const std::byte> file, const TiffDirectory& directory,
+                                const DngImage& image) {
+  if (!is_jpeg(directory, image)) return {};
+  const auto parts = row_parts(directory, image, file.size());
+  if (!parts) return {};  // tiles that share bytes, which LibRaw reads
+  isp::LosslessJpegRows rows(parts->storage, parts->row_samples);
+  for (std::size_t i = 0; i < parts->grid.count; ++i) {
+    rows.open(parts->grid.at.part(file, i));
+    const std::size_t needed = static_cast<std::size_t>(rows_in(*parts, image, i)) * parts->row_samples;
+    if (rows.samples() != 0 && rows.samples() < needed) return undecodable(parts->grid, i);
+  }
+  return {};
 }
 
 bool is_for_libraw(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {

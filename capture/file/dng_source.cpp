@@ -170,6 +170,7 @@ Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, 
     case DngDecoder::libraw:
       break;
   }
+  if (auto enough = check_jpeg_samples(bytes, raw_image, image); !enough) return pass_on(enough);
   auto decoded = decode_dng(dng, bytes, limits);
   if (!decoded) return pass_on(decoded);
   return complete_dng(dng, *std::move(described), bytes.size(), *std::move(decoded), use);

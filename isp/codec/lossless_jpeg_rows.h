@@ -22,6 +22,8 @@ class LosslessJpegRows {
 
   /// Begins a strip or tile, whose bytes must stay until the next one.
   void open(std::span<const std::byte> part);
+  /// Returns the number of samples that the headers of the part state; 0 if they are damaged or of another form.
+  std::size_t samples() const { return good_ ? lines_ * line_.size() : 0; }
   /// Reads the next row of the part. @return false if the part is damaged or too short, or has samples of too many bits
   bool next(std::span<std::uint16_t> row);
   /// Returns true: what follows the last row that is needed is not decoded.

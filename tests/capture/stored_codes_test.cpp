@@ -277,11 +277,18 @@ TEST(StoredCodes, DamagedStorageIsOneClearLine) {
   strips.storage = DngStorage::lossless_jpeg;
   strips.rows_per_strip = 8;
   EXPECT_TRUE(has(test::refused(strips.remove(278)), "from column 0, row 0 on do not decode"));
-  DngBuilder low;
-  low.storage = DngStorage::lossless_jpeg;
-  low.rows_per_strip = 8;
-  low.set(278, Tag::numbers(TagType::u32, {12}));  // two strips of 12 rows, of which 8 are there
-  EXPECT_TRUE(has(test::refused(low), "from column 0, row 0 on do not decode"));
+  for (const DngStorage storage : {DngStorage::lossless_jpeg, DngStorage::tiled_lossless_jpeg}) {
+    for (const double missing : {1, 12}) {  // rows that the parts of the last rows do not have
+      DngBuilder low;
+      low.storage = storage;
+      low.width = low.height = 32;
+      low.rows_per_strip = storage == DngStorage::lossless_jpeg && missing > 1 ? 16 : 0;
+      low.set(257, Tag::numbers(TagType::u32, {32 + missing}));
+      low.set(278, Tag::numbers(TagType::u32, {missing > 1 ? 16 + missing / 2 : 32 + missing}));
+      low.set(323, Tag::numbers(TagType::u32, {16 + std::ceil(missing / 2)}));
+      EXPECT_TRUE(has(test::refused(low), "on do not decode")) << missing;
+    }
+  }
 }
 
 /// Returns the file with the count of values of a tag of its first directory replaced.
