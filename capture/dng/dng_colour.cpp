@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <span>
 #include <utility>
 
 #include "capture/dng/dng_tags.h"
@@ -82,6 +84,16 @@ Result<std::optional<Vector3>> read_positive(const DngFile& dng, const TiffDirec
   return out;
 }
 
+/// Returns whether CameraCalibration was measured with the profile of the file: the signatures of both are equal, or
+/// neither has one (DNG 1.7, CameraCalibrationSignature).
+bool is_calibrated_for_profile(const DngFile& dng, const TiffDirectory& raw_image) {
+  const auto text = [&](TagName name) {
+    const auto bytes = directory_with(dng, raw_image, name).bytes(name).value_or(std::span<const std::byte>{});
+    return bytes.first(static_cast<std::size_t>(std::find(bytes.begin(), bytes.end(), std::byte{0}) - bytes.begin()));
+  };
+  return std::ranges::equal(text(tag::camera_calibration_signature), text(tag::profile_calibration_signature));
+}
+
 /// Reads calibration `index` (0 or 1); nullopt if the file has no usable colour matrix for it.
 std::optional<ColourCalibration> read_calibration(const DngFile& dng, const TiffDirectory& raw_image, int index,
                                                   std::vector<std::string>& warnings) {
@@ -90,8 +102,10 @@ std::optional<ColourCalibration> read_calibration(const DngFile& dng, const Tiff
   const TagName light = tag::calibration_illuminant[index];
   ColourCalibration out;
   out.xyz_to_camera = *colour;
-  out.camera_calibration =
-      or_ignored(read_matrix(dng, raw_image, tag::camera_calibration[index]), warnings).value_or(identity3());
+  if (is_calibrated_for_profile(dng, raw_image)) {
+    out.camera_calibration =
+        or_ignored(read_matrix(dng, raw_image, tag::camera_calibration[index]), warnings).value_or(identity3());
+  }
   out.forward = or_ignored(read_forward(dng, raw_image, tag::forward_matrix[index]), warnings);
   out.cct_k = illuminant_cct_k(or_ignored(directory_with(dng, raw_image, light).whole(light), warnings).value_or(0));
   return out;

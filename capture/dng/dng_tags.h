@@ -55,6 +55,8 @@ inline constexpr TagName default_crop_origin{50719, "DefaultCropOrigin"};
 inline constexpr TagName default_crop_size{50720, "DefaultCropSize"};
 inline constexpr TagName color_matrix[] = {{50721, "ColorMatrix1"}, {50722, "ColorMatrix2"}};
 inline constexpr TagName camera_calibration[] = {{50723, "CameraCalibration1"}, {50724, "CameraCalibration2"}};
+inline constexpr TagName camera_calibration_signature{50931, "CameraCalibrationSignature"};
+inline constexpr TagName profile_calibration_signature{50932, "ProfileCalibrationSignature"};
 inline constexpr TagName analog_balance{50727, "AnalogBalance"};
 inline constexpr TagName as_shot_neutral{50728, "AsShotNeutral"};
 inline constexpr TagName as_shot_white_xy{50729, "AsShotWhiteXY"};

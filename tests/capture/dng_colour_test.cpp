@@ -62,6 +62,24 @@ TEST(DngColour, AsShotWhiteAndAnalogBalanceAreKept) {
   EXPECT_EQ(colour.analog_balance, (Vector3{1.5, 1, 2}));
 }
 
+TEST(DngColour, ACameraCalibrationCountsForTheProfileOfItsSignatureOnly) {
+  const auto diagonal_with = [](const char* of_camera, const char* of_profile) {
+    DngBuilder dng;
+    dng.set(50723, Tag::numbers(TagType::srational, {0.9, 0, 0, 0, 1, 0, 0, 0, 1.1}));
+    if (of_camera != nullptr) dng.set(50931, Tag::text(of_camera));
+    if (of_profile != nullptr) dng.set(50932, Tag::text(of_profile));
+    const RawFrame frame = read_built(dng);
+    EXPECT_TRUE(frame.warnings.empty());
+    return frame.colour.calibrations.at(0).camera_calibration[0][0];
+  };
+  EXPECT_DOUBLE_EQ(diagonal_with(nullptr, nullptr), 0.9);
+  EXPECT_DOUBLE_EQ(diagonal_with("com.adobe", "com.adobe"), 0.9);
+  EXPECT_DOUBLE_EQ(diagonal_with("", nullptr), 0.9);
+  EXPECT_DOUBLE_EQ(diagonal_with("com.adobe", "another"), 1);
+  EXPECT_DOUBLE_EQ(diagonal_with("com.adobe", nullptr), 1);
+  EXPECT_DOUBLE_EQ(diagonal_with(nullptr, "com.adobe"), 1);
+}
+
 TEST(DngColour, AnUnknownCameraWithoutMatrixHasNoCalibration) {
   DngBuilder dng;
   dng.remove(50721);
