@@ -1,5 +1,7 @@
 #include "capture/dng/dng_frame.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -19,6 +21,7 @@
 #include "capture/file/pass_on.h"
 #include "capture/x_trans/x_trans_frame.h"
 #include "isp/base/float_samples.h"
+#include "isp/base/text.h"
 #include "isp/codec/noise_ratio_bytes.h"
 
 namespace lowlux::capture {
@@ -58,11 +61,55 @@ void read_noise_ratio(const DngFile& dng, const TiffDirectory& directory, RawFra
   if (ratio) frame.noise_ratio = std::make_shared<const NoiseRatio>(*std::move(ratio));
 }
 
-void warn_of_gain_tables(const DngFile& dng, const TiffDirectory& directory, std::vector<std::string>& warnings) {
-  for (const TagName name : {tag::profile_gain_table_map, tag::profile_gain_table_map2}) {
+void warn_of_tables(const DngFile& dng, const TiffDirectory& directory, std::vector<std::string>& warnings) {
+  const std::pair<TagName, const char*> tables[] = {{tag::profile_gain_table_map, "local brightness"},
+                                                    {tag::profile_gain_table_map2, "local brightness"},
+                                                    {tag::rgb_tables, "colours"}};
+  for (const auto& [name, what] : tables) {
     if (directory.find(name) == nullptr && dng.main.find(name) == nullptr) continue;
-    warnings.push_back(std::string(name.name) + " is not applied: its maker's image has other local brightness");
+    warnings.push_back(std::string(name.name) + " is not applied: its maker's image has other " + what);
   }
+}
+
+/// Returns a point of the unit square of the stored image in that of the upright image.
+std::pair<double, double> upright(double x, double y, Orientation orientation) {
+  switch (orientation) {
+    case Orientation::mirror_horizontal:
+      return {1 - x, y};
+    case Orientation::rotate_180:
+      return {1 - x, 1 - y};
+    case Orientation::mirror_vertical:
+      return {x, 1 - y};
+    case Orientation::transpose:
+      return {y, x};
+    case Orientation::rotate_90:
+      return {1 - y, x};
+    case Orientation::transverse:
+      return {1 - y, 1 - x};
+    case Orientation::rotate_270:
+      return {y, 1 - x};
+    case Orientation::normal:
+      break;
+  }
+  return {x, y};
+}
+
+/// Warns of a crop that the photographer chose in the camera: top, left, bottom and right as fractions of the default
+/// crop (DNG 1.4, DefaultUserCrop). One that is damaged or keeps everything is ignored.
+void warn_of_user_crop(const DngFile& dng, const TiffDirectory& directory, Orientation orientation,
+                       std::vector<std::string>& warnings) {
+  const TagName name = tag::default_user_crop;
+  const auto stated = (directory.find(name) != nullptr ? directory : dng.main).numbers(name, 4, 4);
+  if (!stated || !*stated) return;
+  const double top = (**stated)[0], left = (**stated)[1], bottom = (**stated)[2], right = (**stated)[3];
+  const bool is_sound = 0 <= top && top < bottom && bottom <= 1 && 0 <= left && left < right && right <= 1;
+  if (!is_sound || (top == 0 && left == 0 && bottom == 1 && right == 1)) return;
+  const auto [x0, y0] = upright(left, top, orientation);
+  const auto [x1, y1] = upright(right, bottom, orientation);
+  const auto percent = [](double fraction) { return number_text(100 * fraction, 4) + "%"; };
+  warnings.push_back(std::string(name.name) + " is not applied: develop --crop " + percent(std::min(x0, x1)) + "," +
+                     percent(std::min(y0, y1)) + "," + percent(std::fabs(x1 - x0)) + "," + percent(std::fabs(y1 - y0)) +
+                     " keeps the part that the camera was set to");
 }
 
 /// Returns the directory with an opcode list: that of the raw image, where DNG requires it, or the first one.
@@ -119,7 +166,8 @@ Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw
   if (auto read = read_levels(raw_image, *image, frame.raw); !read) return pass_on(read);
   read_colour_and_noise(dng, raw_image, frame);
   read_noise_ratio(dng, raw_image, frame);
-  warn_of_gain_tables(dng, raw_image, frame.warnings);
+  warn_of_tables(dng, raw_image, frame.warnings);
+  warn_of_user_crop(dng, raw_image, frame.raw.info.orientation, frame.warnings);
   return described;
 }
 

@@ -71,8 +71,10 @@ inline constexpr TagName forward_matrix[] = {{50964, "ForwardMatrix1"}, {50965, 
 inline constexpr TagName row_interleave_factor{50975, "RowInterleaveFactor"};
 inline constexpr TagName opcode_list[] = {{51008, "OpcodeList1"}, {51009, "OpcodeList2"}, {51022, "OpcodeList3"}};
 inline constexpr TagName noise_profile{51041, "NoiseProfile"};
+inline constexpr TagName default_user_crop{51125, "DefaultUserCrop"};
 inline constexpr TagName profile_gain_table_map{52525, "ProfileGainTableMap"};
 inline constexpr TagName color_matrix_3{52531, "ColorMatrix3"};
+inline constexpr TagName rgb_tables{52543, "RGBTables"};
 inline constexpr TagName profile_gain_table_map2{52544, "ProfileGainTableMap2"};
 inline constexpr TagName column_interleave_factor{52547, "ColumnInterleaveFactor"};
 

@@ -150,10 +150,10 @@ constexpr std::array<TagName, 2> hue_sat_map{{{50938, "ProfileHueSatMapData1"}, 
 constexpr std::array<std::uint16_t, 6> author_tags{270, 315, 700, 18246, 33432, 33723};
 // UniqueCameraModel and LocalizedCameraModel, BayerGreenSplit, BaselineSharpness, CameraSerialNumber, LensInfo,
 // AntiAliasStrength, MakerNoteSafety, OriginalRawFileName, signatures, names, tables and curve of the profile,
-// encodings, BaselineExposureOffset and DefaultBlackRender.
-constexpr std::array<std::uint16_t, 25> dng_tags{50708, 50709, 50732, 50733, 50735, 50736, 50738, 50741, 50827,
+// encodings, BaselineExposureOffset, DefaultBlackRender and DefaultUserCrop.
+constexpr std::array<std::uint16_t, 26> dng_tags{50708, 50709, 50732, 50733, 50735, 50736, 50738, 50741, 50827,
                                                  50931, 50932, 50934, 50936, 50937, 50938, 50939, 50940, 50941,
-                                                 50942, 50981, 50982, 51107, 51108, 51109, 51110};
+                                                 50942, 50981, 50982, 51107, 51108, 51109, 51110, 51125};
 
 /// Returns the bytes of the units whose order counts; 0 for types that are not passed on.
 std::size_t unit_bytes(TiffEntry::Type type) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "isp/base/source_tags.h"
 #include "tests/capture/read_built.h"
 
 namespace lowlux::test {
@@ -35,14 +37,42 @@ TEST(DngLevels, ABlackLevelThatIsNotStatedIsZeroOfLinearRawAndAbsentOfMosaics) {
   }
 }
 
-TEST(DngLevels, GainTablesOfTheProfileAreWarnedOf) {
-  for (const std::uint16_t tag : {52525, 52544}) {
+TEST(DngLevels, ACropThatTheCameraWasSetToIsWarnedOfAndPassedOn) {
+  const auto with = [](double orientation, const std::vector<double>& crop) {
+    DngBuilder dng;
+    dng.set(274, Tag::numbers(TagType::u16, {orientation}));
+    return read_built(dng.set(51125, Tag::numbers(TagType::rational, crop)));
+  };
+  // Where an area across the stored image, and one at its upper left corner, are in the upright image.
+  const char* const crops[] = {"0%,12.5%,100%,75%", "0%,12.5%,100%,75%", "0%,12.5%,100%,75%", "0%,12.5%,100%,75%",
+                               "12.5%,0%,75%,100%", "12.5%,0%,75%,100%", "12.5%,0%,75%,100%", "12.5%,0%,75%,100%"};
+  const char* const corners[] = {"0%,0%,25%,50%", "75%,0%,25%,50%", "75%,50%,25%,50%", "0%,50%,25%,50%",
+                                 "0%,0%,50%,25%", "50%,0%,50%,25%", "50%,75%,50%,25%", "0%,75%,50%,25%"};
+  for (int i = 0; i < 8; ++i) {
+    const RawFrame wide = with(i + 1, {0.125, 0, 0.875, 1}), corner = with(i + 1, {0, 0, 0.5, 0.25});
+    ASSERT_EQ(wide.warnings.size(), 1u);
+    EXPECT_NE(
+        wide.warnings[0].find(std::string("DefaultUserCrop is not applied: develop --crop ") + crops[i] + " keeps"),
+        std::string::npos)
+        << wide.warnings[0];
+    EXPECT_NE(corner.warnings.at(0).find(corners[i]), std::string::npos) << corner.warnings[0] << i + 1;
+    ASSERT_TRUE(wide.source_tags);
+    const auto& tags = wide.source_tags->main;
+    EXPECT_TRUE(std::any_of(tags.begin(), tags.end(), [](const SourceTag& tag) { return tag.id == 51125; }));
+  }
+  for (const std::vector<double>& none : {std::vector<double>{0, 0, 1, 1}, {0.5, 0, 0.5, 1}, {0, 0, 2, 1}, {0, 1}}) {
+    EXPECT_TRUE(with(1, none).warnings.empty());
+  }
+}
+
+TEST(DngLevels, TablesOfTheProfileThatAreNotAppliedAreWarnedOf) {
+  for (const std::uint16_t tag : {52525, 52543, 52544}) {
     DngBuilder dng;
     EXPECT_TRUE(read_built(dng).warnings.empty());
     dng.set(tag, Tag::opaque(std::vector<std::byte>(98)));
     const std::vector<std::string> warnings = read_built(dng).warnings;
     ASSERT_EQ(warnings.size(), 1U);
-    EXPECT_EQ(warnings[0].rfind("ProfileGainTableMap", 0), 0U) << warnings[0];
+    EXPECT_EQ(warnings[0].rfind(tag == 52543 ? "RGBTables" : "ProfileGainTableMap", 0), 0U) << warnings[0];
   }
 }
 
