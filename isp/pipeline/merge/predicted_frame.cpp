@@ -73,10 +73,14 @@ Result<CameraRgb> predicted(RawFrame& frame, const DevelopOptions& options, cons
   return out;
 }
 
-/// Returns the options for a mean, of which black and defects are removed.
-DevelopOptions without_black(DevelopOptions options) {
+/// Returns the options for a mean of frames, of which black, dark frame and defects are removed. Its codes are not
+/// those of the sensor, whose level of saturation they do not show.
+DevelopOptions options_of_mean(DevelopOptions options) {
   options.black = {};
-  options.estimate_dark = options.find_defects = false;
+  options.dark_frame = nullptr;
+  options.series_dark_e.reset();
+  options.series_saturation.reset();
+  options.estimate_dark = options.find_defects = options.find_saturation = false;
   return options;
 }
 
@@ -107,7 +111,7 @@ Result<CameraRgb> predicted_electrons(merge::MosaicMean mean, const FrameElectro
   encode_merged(mean, reference, {}, like, merged, executor);
   mean = merge::MosaicMean(0, 0);
   // Tiles bound the memory, as the mean is kept in addition to the frame made of it.
-  return predicted(merged.frame, without_black(options),
+  return predicted(merged.frame, options_of_mean(options),
                    {.limits = {.max_whole_px = max_whole_mean_px}, .white_e = white_of(colour_levels(reference))},
                    executor);
 }
@@ -121,7 +125,7 @@ Result<void> predict_electrons(const merge::ColourMean& mean, const FrameElectro
     strip.noise->scale[c] = variance[c] / levels.white_e[c];
     strip.noise->offset[c] = variance[c] * levels.variance_e2[c] / std::pow(levels.white_e[c], 2);
   }
-  const DevelopOptions options_of_mean = without_black(options);
+  const DevelopOptions strip_options = options_of_mean(options);
   const PredictionWay way{.level = denoise::Level::draft, .white_e = white_of(levels)};
   RawDn like;
   like.layout = SensorLayout::linear_rgb;
@@ -139,7 +143,7 @@ Result<void> predict_electrons(const merge::ColourMean& mean, const FrameElectro
                                .charge_at_white_e = levels.white_e},
                               like, float_levels(), executor);
     image.samples = {};
-    const Result<CameraRgb> developed = predicted(strip, options_of_mean, way, executor);
+    const Result<CameraRgb> developed = predicted(strip, strip_options, way, executor);
     if (!developed) return tl::make_unexpected(developed.error());
     for (std::size_t c = 0; c < 3; ++c) {
       const std::size_t skipped = static_cast<std::size_t>(first - rows.first) * static_cast<std::size_t>(mean.width());

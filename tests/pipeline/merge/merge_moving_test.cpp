@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <memory>
 #include <numbers>
 #include <random>
 #include <utility>
@@ -86,6 +87,44 @@ TEST(MergeMoving, GainsOfManyFramesAreThoseOfFramesAtRest) {
   const double gain_db = 10 * std::log10(single / burst.mean_square_error(merged.frame, middle));
   std::printf("gain of %d frames: %.2f dB\n", frames, gain_db);
   EXPECT_GT(gain_db, 10 * std::log10(frames) - 1);
+}
+
+// A dark frame is subtracted from each frame, not from their mean once more, which is predicted from as well.
+TEST(MergeMoving, ADarkFrameCountsOncePerFrame) {
+  constexpr int frames = 16;
+  const Burst burst = hand_held(20);
+  const auto pattern_dn = [](int x, int y) { return 40 * ((x / 3 + y / 5) % 4); };
+  auto dark = std::make_shared<DarkFrame>();
+  dark->dn = Plane<float>(burst.width, burst.height);
+  for (int y = 0; y < burst.height; ++y) {
+    for (int x = 0; x < burst.width; ++x)
+      dark->dn.at(x, y) = static_cast<float>(test::night_black_dn + pattern_dn(x, y));
+  }
+  dark->mean_dn.fill(test::night_black_dn + 60);
+  dark->noise_std_dn.fill(2 * test::night_gain_dn_per_e);
+  dark->frames = dark->files = 64;
+  const auto gain_db = [&](bool with_dark) {
+    const FrameReader read = [&](int index, bool) {
+      FrameToMerge out{burst.frame(index), burst.options(), {}};
+      if (!with_dark) return Result<FrameToMerge>(std::move(out));
+      for (int y = 0; y < burst.height; ++y) {
+        for (int x = 0; x < burst.width; ++x) {
+          std::uint16_t& dn = out.frame.raw.dn.at(x, y);
+          dn = static_cast<std::uint16_t>(dn + pattern_dn(x, y));
+        }
+      }
+      out.options.dark_frame = dark;
+      return Result<FrameToMerge>(std::move(out));
+    };
+    InlineExecutor one;
+    const auto merged = merge_frames(frames, read, {.alignment = MergeAlignment::subpixel}, one);
+    EXPECT_TRUE(merged) << merged.error().message;
+    const double single = burst.mean_square_error(burst.frame(0), middle);
+    return 10 * std::log10(single / burst.mean_square_error(merged->frame, middle));
+  };
+  const double without = gain_db(false), with = gain_db(true);
+  std::printf("gain without and with a dark frame: %.2f, %.2f dB\n", without, with);
+  EXPECT_NEAR(with, without, 0.1);
 }
 
 // Frames displaced by whole cells show each pixel in one colour; the others are those of the first prediction. By the
