@@ -103,8 +103,18 @@ TransferPeak peak_of(const Points& flats, Pairs pairs, int site) {
   return peak;
 }
 
-bool is_linear(const TransferPoint& p, const TransferPeak& peak) {
-  return !peak.reached || p.signal_dn <= linear_fraction * peak.signal_dn;
+/// Returns the signal at which the linear range of each site ends. Sites have the same well and converter: one that did
+/// not reach its peak, whose brightest flats may be just below saturation, has the limit of the lowest peak.
+PerSite<double> linear_limits(const PerSite<TransferPeak>& peaks) {
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const TransferPeak& peak : peaks) {
+    if (peak.reached) lowest = std::min(lowest, peak.signal_dn);
+  }
+  PerSite<double> limits{};
+  for (std::size_t site = 0; site < limits.size(); ++site) {
+    limits[site] = linear_fraction * (peaks[site].reached ? peaks[site].signal_dn : lowest);
+  }
+  return limits;
 }
 
 int count_levels(const Points& points, int site) {
@@ -197,8 +207,9 @@ Result<TransferCurve> curve_of(Pairs dark_pairs, Pairs flats, const JoinedDarks&
   if (!points) return tl::make_unexpected(points.error());
   out.flats = std::move(*points);
   for (int site = 0; site < 4; ++site) out.peak[site] = peak_of(out.flats, flats, site);
+  const PerSite<double> limits = linear_limits(out.peak);
   for (const TransferPoint& p : out.flats) {
-    if (is_linear(p, out.peak[p.site]) && !(under_dithered && p.variance_dn2 < dithered_variance_dn2))
+    if (p.signal_dn <= limits[p.site] && !(under_dithered && p.variance_dn2 < dithered_variance_dn2))
       out.linear.push_back(p);
   }
   for (int site = 0; site < 4; ++site) out.levels = std::min(out.levels, count_levels(out.linear, site));
