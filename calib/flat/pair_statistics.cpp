@@ -110,11 +110,11 @@ double column_covariance(const std::vector<ColumnSums>& columns, int parity, con
   const double rows = site.rows, count = static_cast<double>(site.pixels) / rows;
   if (count < 2 || rows < 2) return 0;
   double a = 0, b = 0, ab = 0;
-  for (std::size_t x = static_cast<std::size_t>(parity); x < columns.size(); x += 2) {
+  for (auto x = static_cast<std::size_t>(parity); x < columns.size(); x += 2) {
     a += static_cast<double>(columns[x].a) / rows;
     b += static_cast<double>(columns[x].b) / rows;
   }
-  for (std::size_t x = static_cast<std::size_t>(parity); x < columns.size(); x += 2) {
+  for (auto x = static_cast<std::size_t>(parity); x < columns.size(); x += 2) {
     ab +=
         (static_cast<double>(columns[x].a) / rows - a / count) * (static_cast<double>(columns[x].b) / rows - b / count);
   }
