@@ -10,9 +10,13 @@ namespace lowlux::isp {
 namespace {
 
 constexpr int first_mean = 8;              // frames, of which the reference is predicted first
+constexpr int last_mean = 256;             // merge::ColourMean holds no more frames
 constexpr double colours_share = 0.4;      // of the time of placing a frame: adding it to the mean of all colours
 constexpr double colour_prediction = 4.5;  // times the first prediction: developing all colours at every pixel
 constexpr int motion_frames = 2;           // in which the motion of the camera is measured
+
+/// Returns of how many of the frames the reference is predicted last, at most.
+int last_of(int frames) { return std::min(frames / 2, last_mean); }
 
 bool is_static(MergeAlignment alignment) { return alignment == MergeAlignment::none; }
 
@@ -77,7 +81,7 @@ void state_better(const CostModel& cost, const MergeWork& work, const std::vecto
 }  // namespace
 
 bool predicts_again(int averaged, int frames) {
-  return averaged >= first_mean && std::has_single_bit(static_cast<unsigned>(averaged)) && averaged <= frames / 2;
+  return averaged >= first_mean && std::has_single_bit(static_cast<unsigned>(averaged)) && averaged <= last_of(frames);
 }
 
 bool will_predict_again(int averaged, int frames) {

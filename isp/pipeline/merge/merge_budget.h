@@ -12,7 +12,7 @@ namespace lowlux::isp {
 inline constexpr int sampled_frames = 5;
 
 /// Returns whether a sub-pixel merge of `frames` frames predicts the reference anew once so many are averaged: at 8,
-/// 16 ... frames, where at least as many are still to come. Drops blur what a prediction lacks, such as detail that
+/// 16 ... 256 frames, where at least as many are still to come. Drops blur what a prediction lacks, such as detail that
 /// noise hides in a single frame.
 bool predicts_again(int averaged, int frames);
 

@@ -102,6 +102,7 @@ Result<void> MovedMerge::add_frames() {
 }
 
 void MovedMerge::encode() {
+  colours_.reset();
   work_.adopt_saturation();
   RawFrame& frame = work_.loader.reference();
   if (drizzle_) {
