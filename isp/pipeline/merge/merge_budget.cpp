@@ -85,7 +85,8 @@ bool predicts_again(int averaged, int frames) {
 }
 
 bool will_predict_again(int averaged, int frames) {
-  return std::bit_floor(static_cast<unsigned>(frames / 2)) > static_cast<unsigned>(std::max(averaged, first_mean - 1));
+  return std::bit_floor(static_cast<unsigned>(last_of(frames))) >
+         static_cast<unsigned>(std::max(averaged, first_mean - 1));
 }
 
 double predicted_merge_s(const CostModel& cost, const MergeWork& work, const MergeMethod& method,

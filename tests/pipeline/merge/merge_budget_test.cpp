@@ -213,7 +213,9 @@ TEST(MergeBudget, TheReferenceIsPredictedAnewAtPowersOfTwoUpToHalfOfTheFrames) {
         predicted_merge_s(cost, {.frames = frames, .size = {.megapixels = 1}}, {MergeAlignment::subpixel, true}, false);
     EXPECT_DOUBLE_EQ(predictions, frames < 16 ? 1 : 1 + 4.5 * (std::floor(std::log2(frames)) - 3)) << frames;
     EXPECT_FALSE(predicts_again(frames - frames / 2 + 1, frames)) << frames;
+    // The mean of all colours holds no more than 256 frames.
     EXPECT_TRUE(predicts_again(256, 512 + frames) && !predicts_again(512, 1024 + frames)) << frames;
+    EXPECT_TRUE(will_predict_again(255, 1024 + frames) && !will_predict_again(256, 1024 + frames)) << frames;
     for (int averaged = 1; averaged <= frames; ++averaged) {
       int later = 0;
       for (int i = averaged + 1; i <= frames; ++i) later += predicts_again(i, frames) ? 1 : 0;
