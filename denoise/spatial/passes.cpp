@@ -59,6 +59,7 @@ struct Shrink {
     }
     in.chroma = planes_of(frame, l) == 4 ? chroma : nullptr;
     in.luma_shaped = luma_shaped_power(l, frame.levels);
+    in.coarsest = l + 1 == frame.levels;
     return in;
   }
 

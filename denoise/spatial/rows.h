@@ -109,6 +109,9 @@ struct BlockRow {
   const std::uint8_t* chroma;  // for each strip, whether C1, C2, C3 are wanted; null: nowhere
   /// Power of a spectrum shaped like that of luma over that of the chroma that is known: at least as much is expected.
   float luma_shaped;
+  /// Blocks of the coarsest level have the weight 1 / V, others 1 / (V sum g^2): there, colours fainter than their
+  /// noise are in few blocks, which would count less than those around them.
+  bool coarsest;
 };
 /// Weighted sums of blocks: 8 rows of cells, 4 rows of half width.
 struct BlockSums {

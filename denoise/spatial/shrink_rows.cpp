@@ -86,7 +86,7 @@ HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count
     }
     const VF exists = hn::IfThenElseZero(
         hn::Lt(hn::Iota(f, static_cast<float>(i)), constant(static_cast<float>(count))), constant(1));
-    const VF per_power = hn::Div(exists, power);
+    const VF per_power = in.coarsest ? exists : hn::Div(exists, power);
     const rows::ResidualOfBlocks& shares = in.left[plane == 0 ? 0 : 1];
     const VF rest = hn::MulAdd(constant(shares.other), hn::Sub(constant(64), power), constant(shares.mean));
     const VF left = hn::MulAdd(constant(shares.kept), hn::Sub(power, constant(1)), rest);

@@ -12,6 +12,7 @@
 #include <cstddef>
 
 #include "denoise/spatial/dct-inl.h"
+#include "denoise/spatial/faint_signal.h"
 #include "denoise/spatial/rows.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -100,12 +101,13 @@ HWY_INLINE void coefficients(const float (*from)[run], int place, VF (&x)[8]) {
 
 /// Transforms one group of blocks with the gains gain(i, x) of coefficient i of value x, and returns the sum of their
 /// squares. The gain of the mean is 1.
-template <int kStep, class Gain>
-HWY_INLINE VF filter(Strip& s, int place, const Gain& gain) {
+/// @param row  row(v, x) reads the coefficients of vertical frequency v
+template <class Row, class Gain>
+HWY_INLINE VF filter(Strip& s, int place, const Row& row, const Gain& gain) {
   VF sum = hn::Zero(Floats());
   for (int v = 0; v < 8; ++v) {
     VF x[8];
-    coefficients<kStep>(s.noisy[v], place, x);
+    row(v, x);
     for (int u = 0; u < 8; ++u) {
       const VF g = u == 0 && v == 0 ? constant(1) : gain(8 * v + u, x[u]);
       sum = hn::MulAdd(g, g, sum);
@@ -119,48 +121,94 @@ HWY_INLINE VF filter(Strip& s, int place, const Gain& gain) {
 
 HWY_INLINE VF wiener_gain(VF power, VF variance) { return hn::Div(power, hn::Add(power, variance)); }
 
-/// Hard threshold of luma.
+/// The coefficients of one group of blocks, and what those below their thresholds hold.
+struct Coefficients {
+  HWY_ALIGN float value[64 * hn::MaxLanes(Floats())];
+  VF excess;      // sum over those below of shape (F^2 - noise that is below too)
+  VF sum_shape2;  // sum over those below of shape^2
+
+  template <int kStep>
+  HWY_INLINE void read(const Strip& s, int place) {
+    excess = sum_shape2 = hn::Zero(Floats());
+    for (int v = 0; v < 8; ++v) {
+      VF x[8];
+      coefficients<kStep>(s.noisy[v], place, x);
+      for (int u = 0; u < 8; ++u) store(x[u], value + (8 * v + u) * lanes());
+    }
+  }
+  HWY_INLINE VF at(int i) const { return load(value + i * lanes()); }
+  HWY_INLINE void row(int v, VF (&x)[8]) const {
+    for (int u = 0; u < 8; ++u) x[u] = at(8 * v + u);
+  }
+  /// @param noise  the mean square of noise of which only what is below the threshold counts
+  HWY_INLINE void add_below(int i, hn::Mask<Floats> below, VF square, VF noise) {
+    const VF shape = hn::IfThenElseZero(below, constant(faint_shape[i]));
+    excess = hn::MulAdd(shape, hn::Sub(square, noise), excess);
+    sum_shape2 = hn::MulAdd(shape, shape, sum_shape2);
+  }
+  /// Returns A of the spectrum A shape of the signal in the coefficients below (step 4 of denoise/README.md).
+  HWY_INLINE VF faint_power(VF variance, const FaintSignal& of_plane) const {
+    const VF per_sum = hn::Div(constant(1), hn::Max(sum_shape2, constant(1e-6f)));
+    const VF error = hn::Mul(variance, hn::Sqrt(hn::Mul(constant(2), per_sum)));
+    const VF power = hn::NegMulAdd(constant(of_plane.margin), error, hn::Mul(excess, per_sum));
+    return hn::Mul(constant(of_plane.factor), hn::Max(power, hn::Zero(Floats())));
+  }
+};
+
+/// Hard threshold of luma. What falls below gets the gain P / (P + V), where P is the spectrum of faint signal.
 template <int kStep>
 HWY_INLINE VF threshold_luma(Strip& s, int place, VF variance) {
   const Floats f;
-  const VF least = hn::Mul(constant(9), variance);
+  const VF least = hn::Mul(constant(9), variance), noise = hn::Mul(constant(below_3_sigma), variance);
   VF kept_power = hn::Zero(f);
+  Coefficients all;
+  all.read<kStep>(s, place);
   store(hn::Zero(f), s.luma[0] + place);
-  const VF sum = filter<kStep>(s, place, [&](int i, VF x) HWY_ATTR {
-    const VF square = hn::Mul(x, x);
+  for (int i = 1; i < 64; ++i) {
+    const VF x = all.at(i), square = hn::Mul(x, x);
     const auto kept = hn::Gt(square, least);
     const VF power = hn::IfThenElseZero(kept, square);
     kept_power = hn::Add(kept_power, power);
     store(power, s.luma[i] + place);
-    return hn::IfThenElseZero(kept, constant(1));
-  });
+    all.add_below(i, hn::Not(kept), square, noise);
+  }
   store(hn::MulAdd(constant(4), variance, kept_power), s.luma_power + place);
-  return sum;
+  const VF faint = all.faint_power(variance, faint_luma);
+  const auto row = [&](int v, VF(&x)[8]) HWY_ATTR { all.row(v, x); };
+  return filter(s, place, row, [&](int i, VF) HWY_ATTR {
+    const auto kept = hn::Gt(load(s.luma[i] + place), hn::Zero(f));
+    return hn::IfThenElse(kept, constant(1), wiener_gain(hn::Mul(faint, constant(faint_shape[i])), variance));
+  });
 }
 
 /// Thresholds of chroma, after that of luma: lower where luma is kept. What falls below gets the gain P / (P + V),
-/// where P is a spectrum shaped like that of the luma.
-/// @param luma_shaped  power of that spectrum over that of what is kept
+/// where P is the larger of a spectrum shaped like that of the luma and of that of faint signal.
+/// @param luma_shaped  power of the former over that of what is kept
 template <int kStep>
 HWY_INLINE VF threshold_chroma(Strip& s, int place, VF variance, float luma_shaped) {
   const Floats f;
   const VF least = hn::Mul(constant(16), variance), least_beside_luma = hn::Mul(constant(6.25f), variance);
+  const VF noise_beside_luma = hn::Mul(constant(below_2_5_sigma), variance);
   const auto is_kept = [&](VF square, VF luma) HWY_ATTR {
     return hn::Gt(square, hn::IfThenElse(hn::Gt(luma, hn::Zero(f)), least_beside_luma, least));
   };
   VF kept_power = hn::Zero(f);
-  for (int v = 0; v < 8; ++v) {
-    VF x[8];
-    coefficients<kStep>(s.noisy[v], place, x);
-    for (int u = v == 0 ? 1 : 0; u < 8; ++u) {
-      const VF square = hn::Mul(x[u], x[u]);
-      kept_power = hn::Add(kept_power, hn::IfThenElseZero(is_kept(square, load(s.luma[8 * v + u] + place)), square));
-    }
+  Coefficients all;
+  all.read<kStep>(s, place);
+  for (int i = 1; i < 64; ++i) {
+    const VF x = all.at(i), square = hn::Mul(x, x), luma = load(s.luma[i] + place);
+    const auto kept = is_kept(square, luma);
+    kept_power = hn::Add(kept_power, hn::IfThenElseZero(kept, square));
+    const VF noise = hn::IfThenElse(hn::Gt(luma, hn::Zero(f)), noise_beside_luma, variance);
+    all.add_below(i, hn::Not(kept), square, noise);
   }
   const VF per_luma = hn::Div(hn::Mul(constant(luma_shaped), kept_power), load(s.luma_power + place));
-  return filter<kStep>(s, place, [&](int i, VF x) HWY_ATTR {
+  const VF faint = all.faint_power(variance, faint_chroma);
+  const auto row = [&](int v, VF(&x)[8]) HWY_ATTR { all.row(v, x); };
+  return filter(s, place, row, [&](int i, VF x) HWY_ATTR {
     const VF luma = load(s.luma[i] + place);
-    return hn::IfThenElse(is_kept(hn::Mul(x, x), luma), constant(1), wiener_gain(hn::Mul(per_luma, luma), variance));
+    const VF power = hn::Max(hn::Mul(per_luma, luma), hn::Mul(faint, constant(faint_shape[i])));
+    return hn::IfThenElse(is_kept(hn::Mul(x, x), luma), constant(1), wiener_gain(power, variance));
   });
 }
 
@@ -187,7 +235,8 @@ template <int kStep>
 HWY_INLINE VF wiener_luma(Strip& s, int place, VF variance) {
   const VF sum = pilot_squares<kStep>(s, place, s.luma[0] + place, run);
   store(hn::MulAdd(constant(4), variance, sum), s.luma_power + place);
-  return filter<kStep>(s, place, [&](int i, VF) HWY_ATTR { return wiener_gain(load(s.luma[i] + place), variance); });
+  const auto row = [&](int v, VF(&x)[8]) HWY_ATTR { coefficients<kStep>(s.noisy[v], place, x); };
+  return filter(s, place, row, [&](int i, VF) HWY_ATTR { return wiener_gain(load(s.luma[i] + place), variance); });
 }
 
 /// Empirical Wiener gains of chroma, after those of luma: P is the larger of the pilot's and of a spectrum shaped like
@@ -199,7 +248,8 @@ HWY_INLINE VF wiener_chroma(Strip& s, int place, VF variance, float luma_shaped)
   const int n = lanes();
   const VF sum = pilot_squares<kStep>(s, place, square, n);
   const VF per_luma = hn::Div(hn::Mul(constant(luma_shaped), sum), load(s.luma_power + place));
-  return filter<kStep>(s, place, [&](int i, VF) HWY_ATTR {
+  const auto row = [&](int v, VF(&x)[8]) HWY_ATTR { coefficients<kStep>(s.noisy[v], place, x); };
+  return filter(s, place, row, [&](int i, VF) HWY_ATTR {
     const VF power = hn::Max(hn::Mul(per_luma, load(s.luma[i] + place)), load(square + i * n));
     return wiener_gain(power, variance);
   });

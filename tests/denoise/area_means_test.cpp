@@ -90,6 +90,28 @@ TEST(AreaMeans, PatchesOfFaintColoursKeepTheirColour) {
   }
 }
 
+// By default. Coefficients above thresholds alone keep 0.43 and 0.57 of the colour of patches of 48 pixels, 0.51 and
+// 0.63 of 64, 0.70 and 0.78 of 96, 0.75 and 0.83 of 128, with `draft` and `standard`.
+TEST(FaintColours, OfPatchesAreKeptWhereTheyExceedTheNoiseTogether) {
+  const Camera camera = camera_over(230);
+  struct Least {
+    int side_px;
+    double draft, standard;
+  };
+  for (const auto& [side_px, draft, standard] :
+       {Least{48, 0.55, 0.65}, {64, 0.62, 0.70}, {96, 0.75, 0.81}, {128, 0.80, 0.85}}) {
+    const int offset_px = side_px / 5;
+    const Scene scene = patches(side_px, offset_px);
+    const auto raw = exposed(camera, scene, 1536, 1024, 82);
+    for (const auto& [level, least] : {std::pair{Level::draft, draft}, {Level::standard, standard}}) {
+      const Denoised out(raw, camera, {.level = level});
+      const double slope = slope_of(out.signal, camera, scene, side_px, side_px - offset_px, 6).value();
+      std::printf("%3d px %-8s slope of colours %.3f\n", side_px, std::string(name_of(level)).c_str(), slope);
+      EXPECT_GT(slope, least) << side_px << ' ' << name_of(level);
+    }
+  }
+}
+
 // Errors next to a lamp are large in units of its surroundings.
 TEST(AreaMeans, LampsDoNotChangeTheirSurroundings) {
   const Camera camera = camera_over(5);

@@ -176,6 +176,25 @@ double sum_of(const Block& in) {
   return sum;
 }
 
+/// Returns A of the spectrum A / sqrt(u^2 + v^2) of the signal in the coefficients of plane p below their thresholds.
+double faint_power(int p, const std::array<Block, 4>& f, const std::array<double, 4>& variance) {
+  double excess = 0, sum_shape2 = 0;
+  for (int v = 0; v < block; ++v) {
+    for (int u = 0; u < block; ++u) {
+      if (u + v == 0 || is_kept(p, u, v, f, variance)) continue;
+      const double shape = 1 / std::hypot(u, v), threshold = p == 0 ? 3 : is_kept(0, u, v, f, variance) ? 2.5 : 4;
+      // The mean square of normal values below the threshold; of those below 4 it is that of all.
+      const double density = std::exp(-threshold * threshold / 2) / std::sqrt(2 * std::numbers::pi);
+      const double below = threshold == 4 ? 1 : 1 - 2 * threshold * density / std::erf(threshold / std::numbers::sqrt2);
+      excess += shape * (f[p][v][u] * f[p][v][u] - below * variance[p]);
+      sum_shape2 += shape * shape;
+    }
+  }
+  if (sum_shape2 == 0) return 0;
+  const double margin = p == 0 ? 2 : 3, factor = p == 0 ? 1 : 4;
+  return factor * std::max(0.0, excess / sum_shape2 - margin * variance[p] * std::sqrt(2 / sum_shape2));
+}
+
 /// Returns the gains of the coefficients of plane p (sections "pass 1" and "pass 2" of denoise/README.md).
 /// @param known  the noisy coefficients, of which those above thresholds are known, or the pilot's
 /// @param luma_shaped  see denoise::luma_shaped_power
@@ -183,10 +202,12 @@ Block gains(int p, const std::array<Block, 4>& known, const std::array<double, 4
             double luma_shaped) {
   const Block own = power_of(p, known, variance, hard), luma = power_of(0, known, variance, hard);
   const double per_luma = p == 0 ? 0 : luma_shaped * sum_of(own) / (sum_of(luma) + 4 * variance[0]);
+  const double faint = hard ? faint_power(p, known, variance) : 0;
   Block gain{};
   for (int v = 0; v < block; ++v) {
     for (int u = 0; u < block; ++u) {
-      const double power = std::max(hard ? 0 : own[v][u], per_luma * luma[v][u]);
+      const double rest = !hard ? own[v][u] : u + v == 0 ? 0 : faint / std::hypot(u, v);
+      const double power = std::max(rest, per_luma * luma[v][u]);
       gain[v][u] = hard && is_kept(p, u, v, known, variance) ? 1 : power / (power + variance[p]);
     }
   }
@@ -229,7 +250,7 @@ Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride
         const Block value = inverse_dct(kept);
         const auto left = denoise::residual_fractions(p == 0 ? denoise::PlaneKind::luma : denoise::PlaneKind::chroma,
                                                       pilot == nullptr ? 0 : 1, stride, level, levels);
-        const double share = 1 / (v[p] * power);
+        const double share = 1 / (v[p] * (level + 1 == levels ? 1 : power));
         const double residual = v[p] * (left.kept * (power - 1) + left.other * (64 - power) + left.mean);
         for (int i = 0; i < block * block; ++i) {
           const int at_x = x0 + i % block, at_y = y0 + i / block;
