@@ -20,13 +20,15 @@ namespace {
 /// Sums of columns over the rows of a square, for one row of squares.
 class ColumnSums {
  public:
-  ColumnSums(const RgbView<const float>& picture, int top) : picture_(picture) {
+  ColumnSums(const RgbView<const float>& picture, int top) : picture_(picture), top_(top) {
     for (auto& plane : sum_) plane.resize(static_cast<std::size_t>(picture[0].width));
     for (int y = top; y < top + seen_box_px; ++y) add(y, 1);
   }
   void move_to(int top) {
-    add(top + seen_box_px - 1, 1);
-    add(top - 1, -1);
+    for (; top_ < top; ++top_) {
+      add(top_ + seen_box_px, 1);
+      add(top_, -1);
+    }
   }
   /// Lab of the squares of this row, left to right.
   void labs(const Matrix3& to_xyz, const Xyz& white, std::vector<Lab>& out) const {
@@ -52,6 +54,7 @@ class ColumnSums {
   }
 
   const RgbView<const float>& picture_;
+  int top_;
   std::array<std::vector<double>, 3> sum_;
 };
 
@@ -59,6 +62,7 @@ struct Work {
   const RgbView<const float>& first;
   const RgbView<const float>& second;
   Plane<float>& difference;
+  int row_step;
   int bands;
 };
 
@@ -67,13 +71,11 @@ void compare_band(const Work& work, int band) {
   if (from == to) return;
   const Matrix3 to_xyz = *inverse(*xyz_to_output(OutputSpace::linear_srgb));
   const Xyz white = *xyz_of(output_white);
-  ColumnSums a(work.first, from), b(work.second, from);
+  ColumnSums a(work.first, work.row_step * from), b(work.second, work.row_step * from);
   std::vector<Lab> lab_a(static_cast<std::size_t>(work.difference.width())), lab_b(lab_a.size());
   for (int y = from; y < to; ++y) {
-    if (y > from) {
-      a.move_to(y);
-      b.move_to(y);
-    }
+    a.move_to(work.row_step * y);
+    b.move_to(work.row_step * y);
     a.labs(to_xyz, white, lab_a);
     b.labs(to_xyz, white, lab_b);
     float* const out = work.difference.row(y);
@@ -148,11 +150,11 @@ double PixelDifference::around(int x, int y) const {
 }
 
 SeenDifference seen_difference(const RgbView<const float>& first, const RgbView<const float>& second,
-                               Executor& executor) {
+                               Executor& executor, int row_step) {
   assert(first[0].width == second[0].width && first[0].height == second[0].height);
   assert(first[0].width >= seen_box_px && first[0].height >= seen_box_px);
-  Plane<float> difference(first[0].width - seen_box_px + 1, first[0].height - seen_box_px + 1);
-  const Work work{first, second, difference, executor.width()};
+  Plane<float> difference(first[0].width - seen_box_px + 1, (first[0].height - seen_box_px) / row_step + 1);
+  const Work work{first, second, difference, row_step, executor.width()};
   for_each_index(executor, work.bands, [&](int band) { compare_band(work, band); });
   return statistics_of({difference.data(), difference.data() + difference.size()});
 }

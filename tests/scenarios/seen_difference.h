@@ -17,8 +17,9 @@ struct SeenDifference {
 };
 
 /// @param first, second  linear Rec. 709 as displayed, 0..1; of one size, at least 8 x 8
+/// @param row_step       squares start in every row, or in one of so many: percentiles of large images hardly change
 SeenDifference seen_difference(const RgbView<const float>& first, const RgbView<const float>& second,
-                               Executor& executor);
+                               Executor& executor, int row_step = 1);
 
 /// Of 8-bit sRGB codes.
 SeenDifference seen_difference(const Encoded8& first, const Encoded8& second, Executor& executor);
