@@ -37,6 +37,7 @@ struct Verb {
 constexpr std::array verbs{
     Verb{"develop", "develop raw files to images", run_develop},
     Verb{"denoise", "denoise raw files and write DNG for other raw developers", run_denoise},
+#ifndef LOWLUX_DEVELOP_ONLY
     Verb{"merge", "merge several raw files of one scene to one with less noise", run_merge},
     Verb{"info", "print what a raw file states and what was measured on it; exposure advice", run_info},
     Verb{"capture", "take images, raw files or video from a camera", run_capture},
@@ -47,6 +48,7 @@ constexpr std::array verbs{
     Verb{"simulate", "simulate raw files with a known noise-free reference", run_simulate},
     Verb{"dataset", "simulate data sets: scenes, sensors and settings from distributions", run_dataset},
     Verb{"compare", "compare two images: CIEDE2000, gamut, PSNR, SSIM", run_compare},
+#endif
 #ifdef LOWLUX_WITH_MEASUREMENT
     Verb{"bench", "measure accuracy against time, compared with other methods", run_bench},
     Verb{"reproduce", "run the published experiments and compare the findings", run_reproduce},

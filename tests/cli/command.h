@@ -16,6 +16,12 @@ inline std::string tested_command() {
   return other != nullptr ? other : LOWLUX_COMMAND;
 }
 
+/// Returns the path of a command that simulates: that of this build if LOWLUX_DEVELOP_ONLY states that the tested one
+/// was built with this option.
+inline std::string simulating_command() {
+  return std::getenv("LOWLUX_DEVELOP_ONLY") != nullptr ? LOWLUX_COMMAND : tested_command();
+}
+
 /// Runs the command with these words to its end.
 inline ProcessResult lowlux(std::vector<std::string> words) {
   words.insert(words.begin(), tested_command());

@@ -17,12 +17,12 @@ class SimulateCommand : public testing::Test {
  protected:
   /// `scene`, the output NAME.dng and, unless it is a file, a size that takes no time, then `more`.
   ProcessResult simulate(const std::string& scene, const std::string& name, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> args{"simulate", scene, "-o", file(name)};
+    std::vector<std::string> args{simulating_command(), "simulate", scene, "-o", file(name)};
     if (!std::filesystem::exists(scene) && std::find(more.begin(), more.end(), "--size") == more.end()) {
       args.insert(args.end(), {"--size", "64x48"});
     }
     args.insert(args.end(), more.begin(), more.end());
-    return lowlux(args);
+    return run_process(args);
   }
 
   /// The same, expected to be done without a word on stderr.
