@@ -84,4 +84,19 @@ inline constexpr std::array<CameraSize, 30> camera_sizes{{
     {"Phase One IQ4 150MP", {14204, 10652}},
 }};
 
+/// Returns which cameras' whole images a test goes through: of those of up to `max_pixels`, one drawn of each three
+/// that follow each other, which are of about the same size; scripts/nightly takes all.
+inline std::vector<std::uint32_t> drawn_cameras(std::uint64_t seed, std::int64_t max_pixels) {
+  std::vector<std::uint32_t> all, drawn;
+  for (std::uint32_t i = 0; i < camera_sizes.size(); ++i) {
+    if (camera_sizes[i].size.pixels() <= max_pixels) all.push_back(i);
+  }
+  if (std::getenv("LOWLUX_NIGHTLY") != nullptr) return all;
+  for (std::uint32_t first = 0; first < all.size(); first += 3) {
+    const auto of = std::min<std::uint32_t>(3, static_cast<std::uint32_t>(all.size()) - first);
+    drawn.push_back(all[first + words_at({.seed = seed}, first, 3)[0] % of]);
+  }
+  return drawn;
+}
+
 }  // namespace lowlux::test
