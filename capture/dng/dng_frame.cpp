@@ -128,6 +128,12 @@ void read_corrections(const DngFile& dng, const TiffDirectory& directory, Sample
   }
 }
 
+/// Returns whether the file states a version of DNG before 1.1.
+bool is_dng_1_0(const DngFile& dng) {
+  const auto version = dng.main.numbers(tag::dng_version, 4, 4);
+  return version && *version && (**version)[0] == 1 && (**version)[1] == 0;
+}
+
 /// Finishes a frame that has its samples.
 Result<RawFrame> finished(const DngFile& dng, const DngDescription& described, RawFrame frame, const XTransUse& use,
                           bool has_linear_codes = false) {
@@ -156,6 +162,7 @@ Result<RawFrame> finished(const DngFile& dng, const DngDescription& described, R
 Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw_image, std::size_t file_bytes) {
   auto image = dng_image(raw_image, file_bytes);
   if (!image) return pass_on(image);
+  image->is_dng_1_0 = is_dng_1_0(dng);
   DngDescription described{&raw_image, *image, {}};
   RawFrame& frame = described.frame;
   frame.raw.layout = image->layout;

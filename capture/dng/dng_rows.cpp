@@ -65,7 +65,8 @@ bool is_jpeg(const TiffDirectory& directory, const DngImage& image) {
 Result<isp::RowStorage> storage_of(const TiffDirectory& directory, const DngImage& image, int pixel_samples) {
   auto compression = directory.whole_or(tag::compression, tag::compression_none);
   if (!compression) return pass_on(compression);
-  isp::RowStorage storage{.bits = image.bits, .big_endian = directory.big_endian};
+  isp::RowStorage storage{
+      .bits = image.bits, .big_endian = directory.big_endian, .has_bits_of_category_16 = image.is_dng_1_0};
   if (*compression == tag::compression_none || is_jpeg(directory, image)) return storage;
   if (!is_deflate(*compression)) {
     return unsupported("the floating-point image is compressed with " + compression_name(*compression) +

@@ -34,6 +34,7 @@ struct DngImage {
   int bits = 0;               // per sample, as stored
   bool is_float = false;      // floating-point samples, of 16, 24 or 32 bits
   bool is_planar = false;     // stored colour after colour, and not pixel after pixel
+  bool is_dng_1_0 = false;    // of a file of DNG 1.0, whose lossless JPEG differs (lossless_jpeg_rows.h)
   DngDecoder decoder = DngDecoder::libraw;
   int row_interleave = 1, column_interleave = 1;  // images that they are stored as; 1 but for JPEG XL
   SensorLayout layout = SensorLayout::bayer;

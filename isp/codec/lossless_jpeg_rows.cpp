@@ -36,7 +36,9 @@ int predict(int predictor, int a, int b, int c) {
 }  // namespace
 
 LosslessJpegRows::LosslessJpegRows(const RowStorage& storage, std::size_t row_samples)
-    : bits_per_sample_(storage.bits), row_samples_(row_samples) {}
+    : bits_per_sample_(storage.bits),
+      has_bits_of_category_16_(storage.has_bits_of_category_16),
+      row_samples_(row_samples) {}
 
 void LosslessJpegRows::open(std::span<const std::byte> part) {
   tables_ = {};
@@ -235,7 +237,7 @@ std::optional<int> LosslessJpegRows::difference(const Table& table) {
   if (length == 0) return std::nullopt;
   bit_count_ -= length;
   if (category == 0) return 0;
-  if (category == max_category) return 32768;
+  if (category == max_category && !has_bits_of_category_16_) return 32768;
   const int value = static_cast<int>(peek(category) & mask(category));
   bit_count_ -= category;
   return value < 1 << (category - 1) ? value - (1 << category) + 1 : value;

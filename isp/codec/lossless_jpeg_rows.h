@@ -14,6 +14,9 @@ namespace lowlux::isp {
 /// Reads the samples of lossless JPEGs (ITU-T T.81, process 14), one for each strip or tile, in rows of any length:
 /// DNG lets the lines of a JPEG differ from the rows of its tile. Memory is that of one row and two lines.
 ///
+/// Files of DNG 1.0 have 16 bits after the code of category 16, the difference 32768; T.81 and later files have none
+/// (fLosslessJPEGBug16 of Adobe's DNG SDK, ljpeg_diff of LibRaw).
+///
 /// 1 to 4 components that are not subsampled, any predictor, restart intervals of whole lines; no point transform.
 class LosslessJpegRows {
  public:
@@ -52,6 +55,7 @@ class LosslessJpegRows {
   std::optional<int> difference(const Table& table);
 
   int bits_per_sample_;
+  bool has_bits_of_category_16_;
   std::size_t row_samples_;
 
   std::array<Table, 4> tables_;

@@ -14,6 +14,7 @@ struct RowStorage {
   bool deflated = false;    // zlib streams; else the samples themselves
   int predictor_step = 0;   // bytes of floats or samples of codes to the one that predicts it; 0: no predictor
   bool big_endian = false;  // byte order of codes of 16 bits, and of floats without a predictor
+  bool has_bits_of_category_16 = false;  // lossless JPEG of DNG 1.0
 };
 
 /// Returns the greatest number of bytes that a zlib stream of `bytes` can expand to: 1032 for each (zlib's manual).

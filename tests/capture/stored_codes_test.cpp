@@ -128,6 +128,38 @@ TEST(StoredCodes, LosslessJpegInAnyStripsOrTilesIsReadAsStored) {
   }
 }
 
+/// Returns a lossless JPEG in which every difference is 32768, with a code of one bit, which 16 bits follow in DNG 1.0.
+std::vector<std::byte> jpeg_of_32768(int columns, int lines, bool is_dng_1_0) {
+  std::vector<int> bytes{0xFF, 0xD8, 0xFF, 0xC4, 0, 20, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 16};
+  for (const int byte : {0xFF, 0xC3, 0, 11, 16, 0, lines, 0, columns, 1, 1, 0x11, 0}) bytes.push_back(byte);
+  for (const int byte : {0xFF, 0xDA, 0, 8, 1, 1, 0, 1, 0, 0}) bytes.push_back(byte);
+  std::string bits;
+  for (int i = 0; i < columns * lines; ++i) bits += is_dng_1_0 ? "01000000000000000" : "0";
+  bits.resize((bits.size() + 7) / 8 * 8, '1');
+  for (std::size_t i = 0; i < bits.size(); i += 8) bytes.push_back(std::stoi(bits.substr(i, 8), nullptr, 2));
+  std::vector<std::byte> out;
+  for (const int byte : bytes) out.push_back(static_cast<std::byte>(byte));
+  return out;
+}
+
+/// LibRaw reads one strip, and lowlux two.
+TEST(StoredCodes, TheDifferenceOf32768IsReadAsTheVersionOfTheDngWritesIt) {
+  for (const int version : {0, 1, 4}) {
+    for (const int strips : {1, 2}) {
+      DngBuilder dng;
+      dng.set(50706, Tag::numbers(TagType::byte, {1.0, static_cast<double>(version), 0, 0}));
+      dng.storage = DngStorage::lossless_jpeg;
+      dng.rows_per_strip = 24 / strips;
+      dng.stored_parts.assign(strips, jpeg_of_32768(24, 24 / strips, version == 0));
+      const std::vector<std::uint16_t> samples = test::samples_of(test::read_built(dng));
+      ASSERT_EQ(samples.size(), std::size_t{24} * 24);
+      for (int i = 0; i < 24 * 24; ++i) {
+        ASSERT_EQ(samples[i], (i / 24 + i % 24) % 2 == 0 ? 0 : 32768) << "1." << version << ", " << strips << " strips";
+      }
+    }
+  }
+}
+
 /// LibRaw 0.20 shifts the rows of a tile that is wider than the image, and leaves half of a monochrome tile black.
 TEST(StoredCodes, LosslessJpegThatLibRawMisplacesIsReadAsStored) {
   for (const bool monochrome : {false, true}) {

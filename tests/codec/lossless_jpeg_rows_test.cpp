@@ -19,7 +19,8 @@ constexpr unsigned seed = 20261129;
 
 struct Form {
   int columns = 1, lines = 1, components = 1, precision = 16, predictor = 1, tables = 1;
-  int restart_lines = 0;  // 0: none
+  int restart_lines = 0;    // 0: none
+  bool is_dng_1_0 = false;  // 16 bits follow the code of category 16
 };
 
 /// Writes lossless JPEG as ITU-T T.81 states it in annexes B, C, F.1.2 and H, bit by bit.
@@ -102,7 +103,8 @@ class PlainEncoder {
     } else {
       put_bits(category == 15 ? 0x7FFF : 0x8000, 16);
     }
-    if (category < 16) put_bits(difference > 0 ? difference : difference + (1 << category) - 1, category);
+    if (category < 16 || form_.is_dng_1_0)
+      put_bits(difference > 0 ? difference : difference + (1 << category) - 1, category);
   }
 
   Form form_;
@@ -126,12 +128,14 @@ Form drawn_form(std::mt19937& random) {
           .precision = 2 + below(15),
           .predictor = 1 + below(7),
           .tables = 1 + below(4),
-          .restart_lines = below(3) == 0 ? 1 + below(9) : 0};
+          .restart_lines = below(3) == 0 ? 1 + below(9) : 0,
+          .is_dng_1_0 = below(4) == 0};
 }
 
 /// Returns the first `count` samples of a JPEG in rows of `row`; fewer if it does not decode.
-std::vector<std::uint16_t> read(const std::vector<std::byte>& jpeg, std::size_t row, std::size_t count, int bits = 16) {
-  LosslessJpegRows rows({.bits = bits}, row);
+std::vector<std::uint16_t> read(const std::vector<std::byte>& jpeg, std::size_t row, std::size_t count, int bits = 16,
+                                bool is_dng_1_0 = false) {
+  LosslessJpegRows rows({.bits = bits, .has_bits_of_category_16 = is_dng_1_0}, row);
   rows.open(jpeg);
   std::vector<std::uint16_t> out, one(row);
   while (out.size() < count && rows.next(one)) out.insert(out.end(), one.begin(), one.end());
@@ -146,11 +150,23 @@ TEST(LosslessJpegRows, EveryFormGivesTheSamplesThatWereEncoded) {
     const std::size_t row =
         i % 2 == 0 ? static_cast<std::size_t>(form.columns * form.components) : 1 + random() % samples.size();
     const std::size_t count = samples.size() / row * row;
-    const auto decoded = read(PlainEncoder(form, samples).encode(), row, count);
+    const auto decoded = read(PlainEncoder(form, samples).encode(), row, count, 16, form.is_dng_1_0);
     ASSERT_TRUE(std::equal(decoded.begin(), decoded.end(), samples.begin()) && decoded.size() == count)
         << form.columns << " x " << form.lines << " x " << form.components << ", " << form.precision
         << " bits, predictor " << form.predictor << ", " << form.tables << " tables, restart " << form.restart_lines
         << ", rows of " << row << ", draw " << i << " of seed " << seed;
+  }
+}
+
+TEST(LosslessJpegRows, TheDifferenceOf32768IsReadAsEachVersionOfDngWritesIt) {
+  Form form{.columns = 9, .lines = 5};
+  std::vector<std::uint16_t> samples;
+  for (int i = 0; i < 45; ++i) samples.push_back(static_cast<std::uint16_t>(i % 3 == 0 ? 100 : 100 + 32768));
+  for (const bool is_dng_1_0 : {false, true}) {
+    form.is_dng_1_0 = is_dng_1_0;
+    const auto jpeg = PlainEncoder(form, samples).encode();
+    EXPECT_EQ(read(jpeg, 9, 45, 16, is_dng_1_0), samples);
+    EXPECT_NE(read(jpeg, 9, 45, 16, !is_dng_1_0), samples);
   }
 }
 
