@@ -23,9 +23,19 @@ tl::unexpected<Error> wrong_size(std::uint32_t width, std::uint32_t height) {
                                         " each way can");
 }
 
-/// Returns whether the samples are floating-point numbers.
+/// Returns whether the samples are floating-point numbers; else they are unsigned integers.
 Result<bool> holds_floats(const TiffDirectory& directory) {
-  return directory.whole_or(tag::sample_format, 1).map([](std::uint32_t format) { return format == 3; });
+  constexpr double unsigned_integers = 1, floats = 3, undefined = 4;
+  auto formats = directory.numbers(tag::sample_format, 1, 16);
+  if (!formats) return pass_on(formats);
+  if (!*formats) return false;
+  const double format = (**formats)[0];
+  const bool is_known = format == unsigned_integers || format == floats || format == undefined;
+  if (is_known && std::ranges::count(**formats, format) == std::ssize(**formats)) return format == floats;
+  return fail(ErrorCode::unsupported,
+              "raws of signed or complex numbers or of mixed formats are not supported, unsigned integers and floats "
+              "are (SampleFormat 1 and 3)",
+              tag::sample_format.name);
 }
 
 Result<void> check_bits(double bits, bool is_float) {
@@ -163,6 +173,21 @@ Result<DngDecoder> decoder_of(const TiffDirectory& directory, const DngImage& im
   return fail(ErrorCode::unsupported, std::move(message), tag::compression.name);
 }
 
+/// Checks that the highest bit of each byte is the first one. The compressions that have an order of their own ignore
+/// the tag, as libtiff does.
+Result<void> check_bit_order(const TiffDirectory& directory) {
+  auto compression = directory.whole_or(tag::compression, tag::compression_none);
+  if (!compression) return pass_on(compression);
+  if (*compression != tag::compression_none && !is_deflate(*compression)) return {};
+  auto order = directory.whole_or(tag::fill_order, 1);
+  if (!order) return pass_on(order);
+  if (*order == 1) return {};
+  return fail(ErrorCode::unsupported,
+              "samples with the lowest bit of each byte first (FillOrder " + std::to_string(*order) +
+                  ") are not supported: DNG stores the highest bit first (FillOrder 1)",
+              tag::fill_order.name);
+}
+
 /// Checks that the image data are inside the file and stored as their decoder reads them.
 Result<void> check_storage(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes) {
   if (image.is_planar && image.decoder != DngDecoder::rows) {
@@ -171,6 +196,7 @@ Result<void> check_storage(const TiffDirectory& directory, const DngImage& image
         "images stored colour after colour are supported without compression, in lossless JPEG or with Deflate only",
         tag::planar_configuration.name);
   }
+  if (auto order = check_bit_order(directory); !order) return order;
   switch (image.decoder) {
     case DngDecoder::rows:
       return check_row_image(directory, image, file_bytes);

@@ -11,6 +11,7 @@ inline constexpr TagName image_length{257, "ImageLength"};
 inline constexpr TagName bits_per_sample{258, "BitsPerSample"};
 inline constexpr TagName compression{259, "Compression"};
 inline constexpr TagName photometric{262, "PhotometricInterpretation"};
+inline constexpr TagName fill_order{266, "FillOrder"};
 inline constexpr TagName make{271, "Make"};
 inline constexpr TagName model{272, "Model"};
 inline constexpr TagName strip_offsets{273, "StripOffsets"};

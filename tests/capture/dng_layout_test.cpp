@@ -211,6 +211,37 @@ TEST(DngLayout, KindsThatAreNotDevelopedAreNamed) {
   EXPECT_TRUE(has(with(259, Tag::numbers(TagType::u16, {777})), "compression 777"));
 }
 
+TEST(DngLayout, SamplesThatAreNotUnsignedIntegersOrFloatsAreRefused) {
+  for (const double format : {0, 2, 5, 6}) {
+    DngBuilder dng;
+    EXPECT_TRUE(has(refused(dng.set(339, Tag::numbers(TagType::u16, {format}))), "signed or complex numbers"));
+  }
+  DngBuilder mixed;
+  mixed.samples = 3;
+  EXPECT_TRUE(has(refused(mixed.set(339, Tag::numbers(TagType::u16, {1, 1, 2}))), "mixed formats"));
+  for (const double format : {1, 4}) {
+    DngBuilder dng;
+    dng.set(339, Tag::numbers(TagType::u16, {format}));
+    EXPECT_EQ(samples_of(read_built(dng)), ramp(dng));
+  }
+}
+
+TEST(DngLayout, ReversedBytesAreRefusedWhereTheOrderOfBitsCounts) {
+  for (const auto storage : {DngStorage::uncompressed, DngStorage::lossless_jpeg}) {
+    DngBuilder dng;
+    dng.bits = 12;
+    dng.storage = storage;
+    dng.set(266, Tag::numbers(TagType::u16, {1}));
+    EXPECT_EQ(samples_of(read_built(dng)), ramp(dng));
+    dng.set(266, Tag::numbers(TagType::u16, {2}));
+    if (storage == DngStorage::uncompressed) {
+      EXPECT_TRUE(has(refused(dng), "lowest bit of each byte first (FillOrder 2)"));
+    } else {
+      EXPECT_EQ(samples_of(read_built(dng)), ramp(dng));
+    }
+  }
+}
+
 TEST(DngLayout, ALinearizationTableIsAppliedBeforeTheLevelsCount) {
   DngBuilder dng;
   dng.bits = 8;

@@ -155,6 +155,8 @@ std::vector<Format> other_formats() {
            }},
           {"DNG, mosaic that is not rectangular", [] { return with(plain(), 50711, {2}); }},
           {"DNG, integers of 32 bits", [] { return with(plain(), 258, {32}); }},
+          {"DNG, signed integers", [] { return with(plain(), 339, {2}); }},
+          {"DNG, lowest bit of each byte first", [] { return with(plain(1, 12), 266, {2}); }},
           {"Kodak C603, YCbCr without a header", [] { return dump(9116448); }},
           {"text", [] { return dump(1000); }},
           {"TIFF image", [] { return with(plain(3).remove(50706).remove(50707), 262, {2}); }},
