@@ -170,7 +170,7 @@ Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw
   frame.raw.info = read_info(dng);
   frame.warnings = dng.warnings;
   if (auto read = read_geometry(raw_image, *image, frame.raw, frame.warnings); !read) return pass_on(read);
-  if (auto read = read_levels(raw_image, *image, frame.raw); !read) return pass_on(read);
+  if (auto read = read_levels(raw_image, *image, frame.raw, frame.warnings); !read) return pass_on(read);
   read_colour_and_noise(dng, raw_image, frame);
   read_noise_ratio(dng, raw_image, frame);
   warn_of_tables(dng, raw_image, frame.warnings);

@@ -104,10 +104,19 @@ Result<std::vector<double>> read_deltas(const TiffDirectory& directory, TagName 
   return **std::move(deltas);
 }
 
-Result<BlackLevel> read_black(const TiffDirectory& directory, std::vector<double> stated, const RawDn& raw,
-                              int samples) {
+/// Returns the side of the repeating cell of a mosaic; 1 of other images.
+int mosaic_side(const DngImage& image) {
+  if (image.layout != SensorLayout::bayer) return 1;
+  if (image.x_trans) return 6;
+  return image.quad_bayer ? 4 : 2;
+}
+
+/// Reads the black level. One value is used for all pixels, as some writers mean it. As many values as the cell of the
+/// mosaic has sites are used for these sites if the file states no pattern: DNG's default of 1 x 1 leaves them none.
+Result<BlackLevel> read_black(const TiffDirectory& directory, std::vector<double> stated, const DngImage& image,
+                              const RawDn& raw, std::vector<std::string>& warnings) {
   BlackLevel black;
-  black.samples = samples;
+  const int samples = black.samples = image.samples;
   auto repeat = directory.numbers(tag::black_level_repeat_dim, 2, 2);
   if (!repeat) return pass_on(repeat);
   if (*repeat) {
@@ -120,9 +129,14 @@ Result<BlackLevel> read_black(const TiffDirectory& directory, std::vector<double
     }
     black.rows = static_cast<int>(rows);
     black.columns = static_cast<int>(columns);
+  } else if (const int side = mosaic_side(image); stated.size() == static_cast<std::size_t>(side) * side && side > 1) {
+    black.rows = black.columns = side;
+    warnings.push_back("BlackLevel has " + std::to_string(stated.size()) +
+                       " values, but BlackLevelRepeatDim is missing: they are used for the " + std::to_string(side) +
+                       " x " + std::to_string(side) + " sites of the mosaic");
   }
   const auto expected = static_cast<std::size_t>(black.rows) * black.columns * samples;
-  if (stated.size() == 1) stated.resize(expected, stated.front());  // one value for all, as some writers have it
+  if (stated.size() == 1) stated.resize(expected, stated.front());
   if (stated.size() != expected) {
     return fail(ErrorCode::malformed,
                 "the tag BlackLevel has " + std::to_string(stated.size()) + " values, its pattern needs " +
@@ -230,14 +244,15 @@ Result<std::optional<std::vector<double>>> read_scale(const TiffDirectory& direc
   return scale;
 }
 
-Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw) {
+Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw,
+                         std::vector<std::string>& warnings) {
   auto white = read_white(directory, image);
   if (!white) return pass_on(white);
   raw.white_dn = *white;
   auto stated = directory.numbers(tag::black_level, 1, max_pattern);
   if (!stated) return pass_on(stated);
   if (*stated) {
-    auto black = read_black(directory, **std::move(stated), raw, image.samples);
+    auto black = read_black(directory, **std::move(stated), image, raw, warnings);
     if (!black) return pass_on(black);
     raw.black_tag = *std::move(black);
   } else if (image.is_float || image.samples > 1) {  // DNG's default, which does not hold for the codes of sensors

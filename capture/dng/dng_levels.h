@@ -20,8 +20,10 @@ Result<void> read_geometry(const TiffDirectory& directory, const DngImage& image
 Result<std::optional<std::vector<double>>> read_scale(const TiffDirectory& directory);
 
 /// Reads black and white levels. Precondition: the geometry is filled. White levels not above black are an error. Black
-/// that is not stated is 0 for floating-point samples and images of three samples, and otherwise absent.
-Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw);
+/// that is not stated is 0 for floating-point samples and images of three samples, and otherwise absent. A black level
+/// of as many values as the cell of the mosaic has sites, without BlackLevelRepeatDim, gives a warning.
+Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw,
+                         std::vector<std::string>& warnings);
 
 /// Returns the regions of a readout outside its active area, as up to four rectangles that do not overlap.
 std::vector<Rect> borders(int width, int height, const Rect& active);

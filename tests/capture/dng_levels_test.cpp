@@ -111,6 +111,30 @@ INSTANTIATE_TEST_SUITE_P(Sizes, BlackPattern,
                          testing::Values(Pattern{1, 1}, Pattern{2, 2}, Pattern{1, 2}, Pattern{2, 1}, Pattern{4, 4},
                                          Pattern{3, 5}));
 
+/// DNG's default is a pattern of 1 x 1, which leaves the other values without a pixel.
+TEST(DngLevels, ValuesForTheSitesOfTheMosaicWithoutAPatternAreUsedWithAWarning) {
+  DngBuilder dng;
+  dng.width = dng.height = 31;
+  dng.set(50829, Tag::numbers(TagType::u32, {1, 3, 31, 31}));
+  dng.set(50714, Tag::numbers(TagType::u16, {60, 61, 62, 63}));
+  const RawFrame frame = read_built(dng);
+  ASSERT_TRUE(frame.raw.black_tag);
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) EXPECT_EQ(frame.raw.black_tag->at(x, y), 60 + y % 2 * 2 + x % 2);
+  }
+  EXPECT_EQ(warned(dng).find("BlackLevel has 4 values, but BlackLevelRepeatDim is missing"), 0U) << warned(dng);
+  dng.set(50713, Tag::numbers(TagType::u16, {2, 2}));
+  EXPECT_TRUE(read_built(dng).warnings.empty());
+  dng.set(50713, Tag::numbers(TagType::u16, {1, 1}));
+  EXPECT_TRUE(has(refused(dng), "BlackLevel has 4 values, its pattern needs 1"));
+  DngBuilder other;
+  other.set(50714, Tag::numbers(TagType::u16, {60, 61, 62}));
+  EXPECT_TRUE(has(refused(other), "BlackLevel has 3 values, its pattern needs 1"));
+  other.monochrome = true;
+  other.set(50714, Tag::numbers(TagType::u16, {60, 61, 62, 63}));
+  EXPECT_TRUE(has(refused(other), "BlackLevel has 4 values, its pattern needs 1"));
+}
+
 TEST(DngLevels, DeltasAddToThePatternAtEachActiveColumnAndRow) {
   DngBuilder dng;
   dng.width = 28, dng.height = 27;
