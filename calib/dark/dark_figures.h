@@ -22,8 +22,9 @@ struct DarkTemperatureLaw {
   double temperature_c = 0;
   std::array<Estimate, 3> current_e_per_s{};
   Estimate doubling_c;
-  /// Largest relative deviation of a current from the law, where the errors of the currents do not explain it: the
-  /// standard errors of the law then follow from the deviations. Else 0.
+  double lowest_c = 0, highest_c = 0;  // temperatures of the currents that the law was fitted to
+  /// Largest relative deviation of the currents of a temperature from the law, without the part that their errors
+  /// explain. The standard errors of the law follow from the deviations. 0 where errors explain them.
   double misfit = 0;
   double reduced_chi_square = 0;  // with the errors of the currents
   int degrees_of_freedom = 0;

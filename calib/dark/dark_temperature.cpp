@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <optional>
-#include <set>
 #include <utility>
 #include <vector>
 
@@ -42,24 +42,41 @@ std::vector<LogPoint> log_points(std::span<const double> temperature_c,
   return out;
 }
 
+/// The weighted sum of the deviations of the channels at one temperature.
+struct Deviation {
+  double weighted_sum = 0, weights = 0;
+
+  /// Returns the relative deviation of the currents without the part that their errors explain: 0 below three standard
+  /// errors, which one of some ten temperatures exceeds by chance in a few of a hundred fits.
+  double unexplained() const {
+    const double mean = weighted_sum / weights;
+    if (mean * mean * weights < 9) return 0;
+    return std::expm1(std::sqrt(mean * mean - 1 / weights));
+  }
+};
+
 /// Puts the quality of the fit into the law. Where the currents follow another law, as Arrhenius' with a floor, they
 /// deviate alike in all channels: the deviations of the temperatures, not of their channels, are independent.
 /// @param deviations  of the logarithms from the law
 /// @return the factor of the standard errors
 double judge(std::span<const LogPoint> points, std::span<const double> deviations, DarkTemperatureLaw& law) {
-  double chi_square = 0, largest = 0;
-  std::set<double> temperatures_c;
+  double chi_square = 0;
+  std::map<double, Deviation> of_temperature;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    chi_square += std::pow(deviations[i] / points[i].error, 2);
-    largest = std::max(largest, std::expm1(std::fabs(deviations[i])));
-    temperatures_c.insert(points[i].temperature_c);
+    const double weight = 1 / (points[i].error * points[i].error);
+    chi_square += weight * deviations[i] * deviations[i];
+    Deviation& deviation = of_temperature[points[i].temperature_c];
+    deviation.weighted_sum += weight * deviations[i];
+    deviation.weights += weight;
   }
+  law.lowest_c = of_temperature.begin()->first;
+  law.highest_c = of_temperature.rbegin()->first;
   law.degrees_of_freedom = static_cast<int>(points.size()) - 4;
   law.reduced_chi_square = chi_square / std::max(1, law.degrees_of_freedom);
   if (law.degrees_of_freedom < 1) return 1;
   if (law.reduced_chi_square <= 1 + certain * std::sqrt(2.0 / law.degrees_of_freedom)) return 1;
-  law.misfit = largest;
-  return std::sqrt(chi_square / std::max(1.0, static_cast<double>(temperatures_c.size()) - 2));
+  for (const auto& [celsius, deviation] : of_temperature) law.misfit = std::max(law.misfit, deviation.unexplained());
+  return std::sqrt(chi_square / std::max(1.0, static_cast<double>(of_temperature.size()) - 2));
 }
 
 /// Fits ln D_k(T) = a_k + b (T - T_0); the gain is common to all and changes only a_k.

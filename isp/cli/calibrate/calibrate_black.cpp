@@ -137,12 +137,11 @@ void warn_of_light(const calib::DarkGroup& group, const Darks& darks, std::vecto
 /// Warns of dark current that does not double with a fixed number of degrees, as profiles state it.
 void warn_of_law(const calib::DarkSeries& series, std::vector<std::string>& warnings) {
   if (!series.law || !(series.law->misfit > 0)) return;
-  const double low_c = *series.currents.front().temperature_c, high_c = *series.currents.back().temperature_c;
   warnings.push_back(
       fmt::format("from {:g} to {:g} C the dark current does not double with a fixed number of degrees: the profile is "
                   "off by up to "
                   "{:.2g} %; use darks of the temperatures of the images only",
-                  low_c, high_c, 100 * series.law->misfit));
+                  series.law->lowest_c, series.law->highest_c, 100 * series.law->misfit));
 }
 
 struct Gain {
