@@ -137,6 +137,13 @@ double misfit_of_doubling(std::span<const RateAtTemperature> rates) {
   return ll - tl * tl / tt;
 }
 
+/// Returns the factor of standard errors where the misfit of a law is clearly more than the errors of the rates
+/// explain.
+double error_factor(double chi_square, double degrees) {
+  if (degrees <= 0 || chi_square / degrees <= 1 + 5 * std::sqrt(2 / degrees)) return 1;
+  return std::sqrt(chi_square / degrees);
+}
+
 /// Mean of a plane and the standard error that its scatter gives it.
 Estimate mean_of(const Plane<float>& plane) {
   double sum = 0, squares = 0;
@@ -210,28 +217,33 @@ DarkRate rate_of(std::span<const DarkGroup* const> groups, const Estimate& gain)
           over_gain(slope_of(time_s, variance_dn2), gain, 2), static_cast<int>(groups.size())};
 }
 
-std::optional<Estimate> doubling_of(std::span<const DarkRate> rates) {
+std::optional<Estimate> doubling_of(std::span<const RateAtTemperature> rates) {
   std::vector<double> temperature_c;
   std::vector<Estimate> log2_rate;
-  for (const DarkRate& rate : rates) {
-    const Estimate& current = rate.by_mean_e_per_s;
-    if (!rate.temperature_c || !(current.value > 0)) return std::nullopt;
-    temperature_c.push_back(*rate.temperature_c);
+  for (const auto& [celsius, current] : rates) {
+    if (!(current.value > 0)) return std::nullopt;
+    temperature_c.push_back(celsius);
     log2_rate.push_back({std::log2(current.value), current.standard_error / current.value / std::log(2.0)});
   }
   if (rates.size() < 2) return std::nullopt;
   const Estimate slope = slope_of(temperature_c, log2_rate);
   if (!(slope.value > 0)) return std::nullopt;
-  return Estimate{1 / slope.value, slope.standard_error / (slope.value * slope.value)};
+  const double factor = error_factor(misfit_of_doubling(rates), static_cast<double>(rates.size()) - 2);
+  return Estimate{1 / slope.value, factor * slope.standard_error / (slope.value * slope.value)};
 }
 
-std::optional<DarkLaw> law_of(std::span<const DarkRate> rates, const Estimate& gain) {
-  std::vector<RateAtTemperature> points;
+/// Returns the rates by the means; none if not all of them have a temperature.
+std::vector<RateAtTemperature> rates_by_mean(std::span<const DarkRate> rates) {
+  std::vector<RateAtTemperature> out;
   for (const DarkRate& rate : rates) {
-    if (!rate.temperature_c) return std::nullopt;
-    points.push_back({*rate.temperature_c, rate.by_mean_e_per_s});
+    if (!rate.temperature_c) return {};
+    out.push_back({*rate.temperature_c, rate.by_mean_e_per_s});
   }
-  auto law = fit_dark_law(points);
+  return out;
+}
+
+std::optional<DarkLaw> law_of(std::span<const RateAtTemperature> rates, const Estimate& gain) {
+  auto law = fit_dark_law(rates);
   if (law) {
     Estimate& floor = law->floor_e_per_s;
     floor.standard_error = std::hypot(floor.standard_error, floor.value * gain.standard_error / gain.value);
@@ -252,10 +264,8 @@ std::optional<DarkLaw> fit_dark_law(std::span<const RateAtTemperature> rates) {
   if (degrees > 0 ? doubling <= best.misfit : doubling < explained) return std::nullopt;
   auto law = fit.law(activation_ev, best);
   if (!law) return std::nullopt;
-  if (degrees > 0 && best.misfit / degrees > 1 + 5 * std::sqrt(2 / degrees)) {
-    for (Estimate* e : {&law->activation_ev, &law->floor_e_per_s})
-      e->standard_error *= std::sqrt(best.misfit / degrees);
-  }
+  for (Estimate* e : {&law->activation_ev, &law->floor_e_per_s})
+    e->standard_error *= error_factor(best.misfit, degrees);
   if (!(law->activation_ev.standard_error < activation_ev / 2)) return std::nullopt;
   return law;
 }
@@ -296,8 +306,9 @@ Result<DarkRates> dark_rates(std::span<const DarkGroup> groups, const Estimate& 
     return fail(ErrorCode::insufficient,
                 "no two exposure times of darks at one temperature: dark current is not known");
   }
-  out.doubling_c = doubling_of(of_exact_gain);
-  out.law = law_of(of_exact_gain, gain_dn_per_e);
+  const std::vector<RateAtTemperature> by_mean = rates_by_mean(of_exact_gain);
+  out.doubling_c = doubling_of(by_mean);
+  out.law = law_of(by_mean, gain_dn_per_e);
   return out;
 }
 

@@ -40,9 +40,11 @@ struct DarkRate {
 };
 
 struct DarkRates {
-  std::vector<DarkRate> rates;         // by rising temperature
-  std::optional<Estimate> doubling_c;  // by the means of two or more temperatures; absent if one is not above 0
-  std::optional<DarkLaw> law;          // by the means of three or more temperatures, if they determine it
+  std::vector<DarkRate> rates;  // by rising temperature
+  /// By the means of two or more temperatures; absent if one is not above 0. Its standard error is larger where
+  /// currents deviate from the doubling by clearly more than their errors explain.
+  std::optional<Estimate> doubling_c;
+  std::optional<DarkLaw> law;  // by the means of three or more temperatures, if they determine it
 };
 
 /// Returns whether more than 1 % of the pixels have means above `full_dn`: the mean and the variance of such darks are

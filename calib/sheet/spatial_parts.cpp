@@ -127,8 +127,11 @@ Estimate scaled(const Estimate& figure, const Estimate& gain) {
 }  // namespace
 
 Estimate root_of(const Estimate& variance) {
+  constexpr double of_95_percent = 1.96;  // standard errors
   const double root = std::sqrt(std::max(0.0, variance.value)), near_zero = std::sqrt(variance.standard_error);
-  return {root, root > near_zero ? variance.standard_error / (2 * root) : near_zero};
+  if (root <= near_zero) return {root, near_zero};
+  const double low = std::sqrt(std::max(0.0, variance.value - of_95_percent * variance.standard_error));
+  return {root, variance.standard_error / (root + low)};
 }
 
 Result<PerSite<SpatialParts>> spatial_parts(const DarkGroup& group) {

@@ -42,8 +42,9 @@ Nonuniformity dark_nonuniformity(const PerSite<SpatialParts>& dark, const Estima
 /// @param dark    darks of the flats' exposure time
 Nonuniformity photo_response_nonuniformity(const PerSite<SpatialParts>& bright, const PerSite<SpatialParts>& dark);
 
-/// Returns the square root of a variance: 0 where it is negative. Its standard error is s / (2 root), and at most the
-/// root of s, which holds near 0.
+/// Returns the square root of a variance: 0 where it is negative. Its standard error makes the interval of 1.96 errors
+/// on both sides hold the roots of the interval of the variance, with 0 where that one reaches below: s / (2 root) far
+/// from 0, and the root of s near it.
 Estimate root_of(const Estimate& variance);
 
 }  // namespace lowlux::calib
