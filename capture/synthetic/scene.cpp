@@ -21,9 +21,10 @@ tl::unexpected<Error> wrong(const std::string& what, const std::string& where = 
   return fail(ErrorCode::invalid_argument, what, where);
 }
 
-Result<void> check_luminance(double luminance_cd_m2) {
+Result<void> check_luminance(double luminance_cd_m2, const char* of_what = "a scene") {
   if (luminance_cd_m2 >= 0 && luminance_cd_m2 <= brightest_cd_m2) return {};
-  return wrong("the luminance of a scene must lie between 0 and 1e12 cd/m2, found " + number_text(luminance_cd_m2));
+  return wrong(std::string("the luminance of ") + of_what + " must lie between 0 and 1e12 cd/m2, found " +
+               number_text(luminance_cd_m2));
 }
 
 /// Returns a scene of one size without light, and the radiance of its white.
@@ -148,7 +149,7 @@ Result<Scene> picture_scene(SceneLinear xyz, double luminance_cd_m2) {
 }
 
 Result<void> add_lamp(Scene& scene, double x_px, double y_px, const Spectrum& light, double luminance_cd_m2) {
-  if (auto good = check_luminance(luminance_cd_m2); !good) return good;
+  if (auto good = check_luminance(luminance_cd_m2, "a lamp"); !good) return good;
   auto unit = isp::radiance_of(light, 1);
   if (!unit) return wrong("the lamp's light has no luminance");
   scene.points.push_back({.x_px = x_px,
@@ -179,7 +180,7 @@ std::vector<PointSource> stars_of_cell(const StarField& field, int column, int r
 
 Result<void> add_stars(Scene& scene, int count, double faintest_cd_m2, std::uint64_t seed, int reduction) {
   if (count < 0 || count > 1000000) return wrong("there are 0 to 1000000 stars, found " + std::to_string(count));
-  if (auto good = check_luminance(faintest_cd_m2); !good) return good;
+  if (auto good = check_luminance(faintest_cd_m2, "the faintest star"); !good) return good;
   const StarField field{count,
                         faintest_cd_m2,
                         seed,

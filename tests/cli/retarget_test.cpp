@@ -104,7 +104,7 @@ TEST_F(RetargetCommand, CoefficientsAreReadFromAFile) {
 }
 
 TEST_F(RetargetCommand, WrongCommandLinesAreTold) {
-  refused({"--display-luminance", "0"}, 2, "display's luminance must be positive");
+  refused({"--display-luminance", "0"}, 2, "display's luminance must be within 1e-11");
   refused({"--display-black", "3"}, 2, "below its white");
   refused({"--model", "magic"}, 2, "constrained");
 }

@@ -20,7 +20,7 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
                  "program to score: NAME='PROGRAM {in} {out}', or a known one such as dcraw; repeatable")
       ->type_name("NAME[=COMMAND]")
       ->allow_extra_args(false);
-  app.add_option("--seed", args.seed, "seed of the scenes and noise of the stage methods (default: 1)")->type_name("N");
+  add_seed(app, "--seed", "seed of the scenes and noise of the stage methods (default: 1)", args.seed);
   add_number_within(app, "--time-limit", "S",
                     "time limit for each frame and program of the stage methods [s] (default: 120)", 0.1, 86400,
                     args.time_limit_s);

@@ -43,7 +43,7 @@ OptionStore store_within(std::optional<double>& out, double low, double high, co
   return [&out, low, high, unit](const std::string& text) -> Wrong {
     const auto number = quantity_of(text, unit);
     if (!number || !(*number >= low && *number <= high))
-      return fmt::format("is not within {:g} to {:g} {}", low, high, unit);
+      return fmt::format("is not within {:g} to {:g}{}{}", low, high, *unit == 0 ? "" : " ", unit);
     out = number;
     return std::nullopt;
   };

@@ -232,9 +232,7 @@ Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {
          "folder of the pictures of `retargeting` (default: pictures next to the command, as its build makes them)")
       ->type_name("DIR");
   app.add_flag("--quick", args.quick, "fewer samples: wider confidence intervals");
-  app.add_option("--seed", args.seed, "of the random numbers (default 1)")
-      ->check(CLI::NonNegativeNumber)
-      ->type_name("N");
+  add_seed(app, "--seed", "of the random numbers (default 1)", args.seed);
   app.add_flag("--json", args.json, "print JSON instead of a table");
   app.add_flag("--force", args.force, "overwrite files that exist");
   if (const auto code = parse_words(app, words)) return *code;

@@ -226,12 +226,19 @@ void parse_all(CLI::App& app, const std::vector<std::string>& words, const Defau
 }
 
 /// Returns what is wrong with the arguments. CLI11 reports repeated options and unreadable numbers in technical terms,
-/// which are replaced.
+/// which are replaced, as is "Value 1.5 not in range 1 to 9" of a range of whole numbers.
 std::string error_text(const CLI::ParseError& error) {
   std::string text = error.what();
   std::replace(text.begin(), text.end(), '\n', ' ');
   const std::size_t repeated = text.find(": At Most 1 required but received ");
   if (repeated != std::string::npos) return text.substr(0, repeated) + " is given more than once";
+  constexpr std::string_view value = ": Value ", outside = " not in range ";
+  const std::size_t before = text.find(value), after = text.find(outside);
+  if (before < after && after != std::string::npos) {
+    return fmt::format("{}: '{}' is not a whole number of {}", text.substr(0, before),
+                       text.substr(before + value.size(), after - before - value.size()),
+                       text.substr(after + outside.size()));
+  }
   constexpr std::string_view unreadable = "Could not convert: ";
   const std::size_t equals = text.find(" = ");
   if (!text.starts_with(unreadable) || equals == std::string::npos) return text;
@@ -283,6 +290,15 @@ std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& wo
   if (const CLI::Option* const empty = empty_option(app)) return refuse(app, empty->get_name() + " has no value");
   if (used != nullptr) *used = *defaults;
   return std::nullopt;
+}
+
+CLI::Option* add_seed(CLI::App& app, const std::string& flag, const std::string& help, std::uint64_t& seed) {
+  return add_text(app, flag, "N", help, [&seed](const std::string& text) -> std::optional<std::string> {
+    const auto number = whole_number(text);
+    if (!number) return "is not a whole number of 0 to 18446744073709551615";
+    seed = *number;
+    return std::nullopt;
+  });
 }
 
 CLI::Option* add_shard(CLI::App& app, const std::string& help, Shard& shard) {

@@ -97,6 +97,9 @@ CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum
                   });
 }
 
+/// Adds an option for a seed, a whole number of 64 bits.
+CLI::Option* add_seed(CLI::App& app, const std::string& flag, const std::string& help, std::uint64_t& seed);
+
 /// Adds --shard I/N. @param help  which pieces of work are counted
 CLI::Option* add_shard(CLI::App& app, const std::string& help, Shard& shard);
 

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <system_error>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -98,13 +96,6 @@ Wrong set_tolerance(const std::string& text, isp::Tolerance& tolerance) {
   }
   tolerance.delta_e = (*numbers)[0];
   if (numbers->size() == 2) tolerance.relative_variance = (*numbers)[1];
-  return std::nullopt;
-}
-
-Wrong set_seed(const std::string& text, std::uint64_t& seed) {
-  const char* end = text.data() + text.size();
-  const auto read = std::from_chars(text.data(), end, seed);
-  if (read.ec != std::errc() || read.ptr != end) return "is not a whole number of 0 to 18446744073709551615";
   return std::nullopt;
 }
 
@@ -242,13 +233,12 @@ void add_work(CLI::App& app, SimulateArgs& args, std::optional<int>& frames) {
       {{"physical", capture::PhotonSampling::physical}, {"published", capture::PhotonSampling::published}},
       [&o](capture::PhotonSampling sampling) { o.sampling = sampling; },
       "photons: one Poisson draw for each pixel (default), or one for each wavelength as in the thesis");
-  add_text(app, "--seed", "N",
+  add_seed(app, "--seed",
            "seed of the noise, the stars and the motion (default 1); use different seeds for darks and lights whose "
            "noise must be independent",
-           [&o](const std::string& text) { return set_seed(text, o.seed); });
-  add_text(app, "--sensor-seed", "N",
-           "seed of the fixed pattern, which stands for the specimen of the sensor (default 1)",
-           [&o](const std::string& text) { return set_seed(text, o.sensor_seed); });
+           o.seed);
+  add_seed(app, "--sensor-seed", "seed of the fixed pattern, which stands for the specimen of the sensor (default 1)",
+           o.sensor_seed);
   app.add_option("--frames", frames,
                  "number of frames, OUT_0000.dng and following (default 1, or the exposures of --bracket)")
       ->check(CLI::Range(1, 10000))

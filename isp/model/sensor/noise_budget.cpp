@@ -12,11 +12,6 @@
 namespace lowlux::isp {
 namespace {
 
-struct Named {
-  const char* name;
-  double value;
-};
-
 std::string six_digits(double value) { return number_text(value, 6); }
 
 /// Rejects a law of the dark current that no sensor follows.
@@ -61,33 +56,36 @@ Result<void> check_glow(const SensorModel& sensor) {
   return {};
 }
 
-Result<void> check_not_negative(const SensorModel& s) {
-  for (const Named& figure : std::initializer_list<Named>{{"read noise", s.read_noise_e},
-                                                          {"dark current of red", s.dark_current_e_per_s[0]},
-                                                          {"dark current of green", s.dark_current_e_per_s[1]},
-                                                          {"dark current of blue", s.dark_current_e_per_s[2]},
-                                                          {"photo response non-uniformity", s.prnu},
-                                                          {"dark signal non-uniformity", s.dsnu},
-                                                          {"fraction of hot pixels", s.hot_pixel_fraction},
-                                                          {"dark current of hot pixels", s.hot_pixel_current_e_per_s},
-                                                          {"fraction of telegraph pixels", s.telegraph_fraction},
-                                                          {"telegraph noise", s.telegraph_e},
-                                                          {"row noise", s.row_noise_e},
-                                                          {"column noise", s.column_noise_e}}) {
-    if (!(figure.value >= 0) || !(figure.value <= 1e9)) {
-      return fail(ErrorCode::invalid_argument,
-                  std::string("the ") + figure.name + " must lie between 0 and 1e9, found " + six_digits(figure.value),
-                  s.name);
-    }
-  }
-  for (const Named& noise : std::initializer_list<Named>{{"read noise", s.read_noise_e},
-                                                         {"telegraph noise", s.telegraph_e},
-                                                         {"row noise", s.row_noise_e},
-                                                         {"column noise", s.column_noise_e}}) {
-    if (noise.value > largest_noise_e) {
-      return fail(ErrorCode::invalid_argument,
-                  std::string("the ") + noise.name + " is at most 1e6 e-, found " + six_digits(noise.value), s.name);
-    }
+/// Rejects figures that are negative or above their limits.
+Result<void> check_figures(const SensorModel& s) {
+  struct Limit {
+    double most;
+    const char* text;
+  };
+  constexpr Limit noise{largest_noise_e, "1e6 e-"}, current{1e9, "1e9 e-/s"}, fraction{1, "1"};
+  struct Figure {
+    const char* name;
+    double value;
+    const Limit& limit;
+  };
+  for (const Figure& figure :
+       std::initializer_list<Figure>{{"read noise", s.read_noise_e, noise},
+                                     {"dark current of red", s.dark_current_e_per_s[0], current},
+                                     {"dark current of green", s.dark_current_e_per_s[1], current},
+                                     {"dark current of blue", s.dark_current_e_per_s[2], current},
+                                     {"photo response non-uniformity", s.prnu, fraction},
+                                     {"dark signal non-uniformity", s.dsnu, fraction},
+                                     {"fraction of hot pixels", s.hot_pixel_fraction, fraction},
+                                     {"dark current of hot pixels", s.hot_pixel_current_e_per_s, current},
+                                     {"fraction of telegraph pixels", s.telegraph_fraction, fraction},
+                                     {"telegraph noise", s.telegraph_e, noise},
+                                     {"row noise", s.row_noise_e, noise},
+                                     {"column noise", s.column_noise_e, noise}}) {
+    if (figure.value >= 0 && figure.value <= figure.limit.most) continue;
+    return fail(ErrorCode::invalid_argument,
+                std::string("the ") + figure.name + " must lie between 0 and " + figure.limit.text + ", found " +
+                    six_digits(figure.value),
+                s.name);
   }
   return {};
 }
@@ -103,7 +101,7 @@ double probability(double a, double b) {
 }  // namespace
 
 Result<void> check_sensor(const SensorModel& s) {
-  if (auto good = check_not_negative(s); !good) return good;
+  if (auto good = check_figures(s); !good) return good;
   const auto wrong = [&](const std::string& what) { return fail(ErrorCode::invalid_argument, what, s.name); };
   if (!(s.system_gain_dn_per_e > 0) || !(s.system_gain_dn_per_e <= 1e6)) {
     return wrong("the system gain must be above 0 and at most 1e6 DN/e-, found " + six_digits(s.system_gain_dn_per_e));
@@ -119,13 +117,6 @@ Result<void> check_sensor(const SensorModel& s) {
   }
   if (!(s.full_well_e > 0) || !(s.full_well_e <= largest_full_well_e)) {
     return wrong("the full well must be above 0 and at most 990000 e-, found " + six_digits(s.full_well_e));
-  }
-  for (const Named& share : std::initializer_list<Named>{{"photo response non-uniformity", s.prnu},
-                                                         {"dark signal non-uniformity", s.dsnu},
-                                                         {"fraction of hot pixels", s.hot_pixel_fraction},
-                                                         {"fraction of telegraph pixels", s.telegraph_fraction}}) {
-    if (share.value > 1)
-      return wrong(std::string("the ") + share.name + " is at most 1, found " + six_digits(share.value));
   }
   if (!(s.crosstalk >= 0) || !(s.crosstalk <= largest_crosstalk)) {
     return wrong("the crosstalk must lie between 0 and 0.2 of a pixel's light for each neighbour, found " +

@@ -124,15 +124,15 @@ Result<RetargetMap> wanat_saturation_and_curve(const RetargetOptions& options, c
 }
 
 Result<void> check(const RetargetOptions& options) {
-  const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
+  // The models of appearance take luminances of adaptation, a fifth of white, from 1e-12 on.
+  const auto possible = [](double v) { return v >= 1e-11 && v <= 1e12; };
+  constexpr const char* range = "within 1e-11 and 1e12";
   const auto refuse = [](const std::string& what, double found, const std::string& expected) {
     return fail(ErrorCode::invalid_argument,
                 "the " + what + " must be " + expected + ", found " + number_text(found) + " cd/m2");
   };
-  if (!positive(options.source_cd_m2)) return refuse("source's luminance", options.source_cd_m2, "positive and finite");
-  if (!positive(options.display_cd_m2)) {
-    return refuse("display's luminance", options.display_cd_m2, "positive and finite");
-  }
+  if (!possible(options.source_cd_m2)) return refuse("source's luminance", options.source_cd_m2, range);
+  if (!possible(options.display_cd_m2)) return refuse("display's luminance", options.display_cd_m2, range);
   if (!(options.display_black_cd_m2 >= 0 && options.display_black_cd_m2 < options.display_cd_m2)) {
     return refuse("display's black", options.display_black_cd_m2,
                   "0 or more and below its white of " + number_text(options.display_cd_m2));

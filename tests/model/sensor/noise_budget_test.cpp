@@ -181,7 +181,7 @@ TEST(CheckSensor, NamesWhatIsWrongAndWhatItFound) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
   expect_part(message(&SensorModel::read_noise_e, -2), "found -2");
-  expect_part(message(&SensorModel::row_noise_e, 2e6), "the row noise is at most 1e6 e-, found 2e+06");
+  expect_part(message(&SensorModel::row_noise_e, 2e6), "the row noise must lie between 0 and 1e6 e-, found 2e+06");
   expect_part(message(&SensorModel::white_level_dn, 4000.5), "whole number, found 4000.5");
   expect_part(message(&SensorModel::prnu, 3), "found 3");
   expect_part(message(&SensorModel::dark_temperature_c, 300), "temperature");
