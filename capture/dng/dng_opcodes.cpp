@@ -23,7 +23,7 @@ constexpr std::size_t opcode_header_bytes = 16;
 constexpr std::size_t max_defects = std::size_t{1} << 20;  // in all lists
 constexpr std::size_t max_gains = 64;                      // in all lists
 constexpr std::uint32_t fix_vignette_radial = 3, fix_bad_pixels_constant = 4, fix_bad_pixels_list = 5,
-                        map_polynomial = 8, gain_map = 9;
+                        map_polynomial = 8, gain_map = 9, scale_per_row = 12, scale_per_column = 13;
 
 /// Returns the name of an opcode, DNG 1.4 chapter 7 and DNG 1.6.
 std::string opcode_name(std::uint32_t id) {
@@ -89,9 +89,9 @@ void add_split(const OpcodeContext& context, const GainMap& map) {
 }
 
 /// Adds a map of an X-Trans mosaic to the planes that are made of it.
-void add_to_all_planes(const OpcodeContext& context, GainMap map) {
+void add_to_all_planes(const OpcodeContext& context, std::uint32_t id, GainMap map) {
   if (map.row_pitch != 1 || map.column_pitch != 1 || map.map_planes != 1) {
-    return context.not_applied(gain_map, ": it skips sites of an X-Trans mosaic");
+    return context.not_applied(id, ": it skips sites of an X-Trans mosaic");
   }
   map.first_plane = 0;
   map.planes = 3;
@@ -108,9 +108,8 @@ bool is_usable(const GainMap& map) {
 
 int small(std::uint32_t value) { return static_cast<int>(std::min<std::uint32_t>(value, 1U << 30)); }
 
-Result<void> read_gain_map(const OpcodeContext& context, OpcodeReader in) {
-  const Rect& active = context.frame.raw.active;
-  GainMap map;
+/// Reads the pixels that a map applies to, which may be none, and its planes.
+void read_area(const Rect& active, OpcodeReader& in, GainMap& map) {
   map.top = small(in.u32());
   map.left = small(in.u32());
   map.bottom = std::min(small(in.u32()), active.height);
@@ -119,6 +118,38 @@ Result<void> read_gain_map(const OpcodeContext& context, OpcodeReader in) {
   map.planes = small(in.u32());
   map.row_pitch = small(in.u32());
   map.column_pitch = small(in.u32());
+}
+
+/// Adds the map of an opcode, unless its list or the layout of the image does not let it be applied.
+Result<void> add_gains(const OpcodeContext& context, std::uint32_t id, GainMap map) {
+  if (!is_usable(map)) return context.damaged(id);
+  if (map.top >= map.bottom || map.left >= map.right) return {};  // it applies to no pixel
+  const SensorLayout layout = context.frame.raw.layout;
+  const bool mosaic = layout == SensorLayout::bayer;
+  const bool alike = map.first_plane == 0 && map.planes >= 3 && map.map_planes == 1;
+  const bool split = context.list == 3 && mosaic && !alike;
+  const bool is_one_plane =
+      layout == SensorLayout::monochrome || (context.list == 2 && (mosaic || context.samples.is_x_trans));
+  if (auto room = context.check_gains(split ? 4 : 1); !room) return room;
+  if (context.list == 1) {
+    context.not_applied(id, ": it is meant for values that still hold the black level");
+  } else if (map.first_plane >= (is_one_plane ? 1 : 3)) {
+    context.not_applied(id, ": the image has no colour of its number");
+  } else if (context.list == 2 && context.samples.is_x_trans) {
+    add_to_all_planes(context, id, std::move(map));
+  } else if (split && (map.row_pitch != 1 || map.column_pitch != 1)) {
+    context.not_applied(id, ": it skips rows or columns of demosaiced data");
+  } else if (split) {
+    add_split(context, map);
+  } else {
+    context.found.gain_maps.push_back(std::move(map));
+  }
+  return {};
+}
+
+Result<void> read_gain_map(const OpcodeContext& context, OpcodeReader in) {
+  GainMap map;
+  read_area(context.frame.raw.active, in, map);
   map.points_v = small(in.u32());
   map.points_h = small(in.u32());
   map.spacing_v = in.f64();
@@ -130,25 +161,28 @@ Result<void> read_gain_map(const OpcodeContext& context, OpcodeReader in) {
   if (!in.complete() || points * sizeof(float) > static_cast<double>(in.left())) return context.damaged(gain_map);
   map.gain.resize(static_cast<std::size_t>(points));
   for (float& gain : map.gain) gain = in.f32();
-  if (!is_usable(map)) return context.damaged(gain_map);
-  if (map.top >= map.bottom || map.left >= map.right) return {};  // it applies to no pixel
+  return add_gains(context, gain_map, std::move(map));
+}
 
-  const bool mosaic = context.frame.raw.layout == SensorLayout::bayer;
-  const bool alike = map.first_plane == 0 && map.planes >= 3 && map.map_planes == 1;
-  const bool split = context.list == 3 && mosaic && !alike;
-  if (auto room = context.check_gains(split ? 4 : 1); !room) return room;
-  if (context.list == 1) {
-    context.not_applied(gain_map, ": it is meant for values that still hold the black level");
-  } else if (context.list == 2 && context.samples.is_x_trans) {
-    add_to_all_planes(context, std::move(map));
-  } else if (split && (map.row_pitch != 1 || map.column_pitch != 1)) {
-    context.not_applied(gain_map, ": it skips rows or columns of demosaiced data");
-  } else if (split) {
-    add_split(context, map);
-  } else {
-    context.found.gain_maps.push_back(std::move(map));
-  }
-  return {};
+/// Reads one gain for each row or column of an area, as a map with a point in each.
+Result<void> read_scale(const OpcodeContext& context, std::uint32_t id, OpcodeReader in) {
+  const Rect& active = context.frame.raw.active;
+  GainMap map;
+  read_area(active, in, map);
+  const std::uint32_t count = in.u32();
+  if (!in.complete() || std::uint64_t{count} * sizeof(float) > in.left()) return context.damaged(id);
+  const bool of_rows = id == scale_per_row;
+  const int first = of_rows ? map.top : map.left, end = of_rows ? map.bottom : map.right;
+  const int pitch = of_rows ? map.row_pitch : map.column_pitch, side = of_rows ? active.height : active.width;
+  if (pitch < 1 || (end > first && std::int64_t{count} * pitch < end - first)) return context.damaged(id);
+  map.gain.resize(count);
+  for (float& gain : map.gain) gain = in.f32();
+  map.points_v = of_rows ? static_cast<int>(count) : 1;
+  map.points_h = of_rows ? 1 : static_cast<int>(count);
+  map.map_planes = 1;
+  (of_rows ? map.spacing_v : map.spacing_h) = static_cast<double>(pitch) / side;
+  (of_rows ? map.origin_v : map.origin_h) = (first + 0.5) / side;
+  return add_gains(context, id, std::move(map));
 }
 
 Result<void> read_vignette(const OpcodeContext& context, OpcodeReader in) {
@@ -241,6 +275,9 @@ Result<void> read_opcode(const OpcodeContext& context, std::uint32_t id, std::sp
   switch (id) {
     case gain_map:
       return read_gain_map(context, OpcodeReader(parameters));
+    case scale_per_row:
+    case scale_per_column:
+      return read_scale(context, id, OpcodeReader(parameters));
     case fix_vignette_radial:
       return read_vignette(context, OpcodeReader(parameters));
     case fix_bad_pixels_list:

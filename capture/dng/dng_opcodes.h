@@ -57,10 +57,11 @@ struct SampleState {
 /// Reads a DNG opcode list (DNG 1.4, chapter 7) into the corrections of a frame. Precondition: the geometry, layout,
 /// phase and samples of `frame.raw` are filled.
 ///
-/// GainMap and FixVignetteRadial of lists 2 and 3, FixBadPixelsList and FixBadPixelsConstant are kept; every other
-/// opcode becomes a warning that names it. Gains of list 3 are meant for demosaiced data: applied to the mosaic they
-/// give the same image where nothing clips, because demosaicing is linear and gains vary slowly. Opcodes that are not
-/// applied become warnings whether the file marks them optional or not: the image without them is still useful.
+/// GainMap, ScalePerRow, ScalePerColumn (as gain maps with a point in each row or column) and FixVignetteRadial of
+/// lists 2 and 3, FixBadPixelsList and FixBadPixelsConstant are kept; every other opcode becomes a warning that names
+/// it. Gains of list 3 are meant for demosaiced data: applied to the mosaic they give the same image where nothing
+/// clips, because demosaicing is linear and gains vary slowly. Opcodes that are not applied become warnings whether the
+/// file marks them optional or not: the image without them is still useful.
 ///
 /// The opcodes of a list build on each other, so a list is applied completely or not at all: on an error, which names
 /// the damaged value or the exceeded limit, `frame` stays as it was. A list holds up to 64 opcodes, the frame up to 64

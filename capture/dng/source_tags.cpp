@@ -236,7 +236,7 @@ void add_directory(const TiffFile& tiff, const TiffDirectory& main, TagName poin
 /// Returns the opcodes of OpcodeList3 other than gains and defects, which are in RawFrame::corrections; empty if there
 /// are none or the list is damaged.
 std::vector<std::byte> other_opcodes(std::span<const std::byte> list) {
-  constexpr std::array<std::uint32_t, 4> read{3, 4, 5, 9};
+  constexpr std::array<std::uint32_t, 6> read{3, 4, 5, 9, 12, 13};
   constexpr std::size_t header = 16;
   std::vector<std::byte> out(4);
   std::size_t at = 4;

@@ -71,6 +71,56 @@ DngBuilder with(std::uint16_t list_tag, const std::vector<Opcode>& opcodes) {
 
 constexpr std::uint16_t list1 = 51008, list2 = 51009, list3 = 51022;
 
+TEST(DngOpcodes, ScalesOfRowsAndColumnsAreGainMapsWithAPointInEach) {
+  struct Area {
+    std::uint32_t top, left, bottom, right, row_pitch, column_pitch;
+  };
+  for (const Area& a : {Area{0, 0, 24, 24, 1, 1}, {3, 5, 20, 21, 3, 2}, {1, 0, 24, 9, 2, 5}, {7, 2, 100, 100, 4, 1}}) {
+    for (const bool of_rows : {true, false}) {
+      const std::uint32_t first = of_rows ? a.top : a.left, pitch = of_rows ? a.row_pitch : a.column_pitch;
+      const std::uint32_t end = std::min(of_rows ? a.bottom : a.right, 24U), count = (end - first + pitch - 1) / pitch;
+      Opcode scale =
+          words(of_rows ? 12 : 13, {a.top, a.left, a.bottom, a.right, 0, 1, a.row_pitch, a.column_pitch, count});
+      for (std::uint32_t i = 0; i < count; ++i) append_f32(scale.parameters, 1 + 0.01F * static_cast<float>(i));
+      const RawFrame frame = read_built(with(list2, {scale}));
+      EXPECT_TRUE(frame.warnings.empty());
+      ASSERT_EQ(frame.corrections.gain_maps.size(), 1u);
+      const GainMap& map = frame.corrections.gain_maps[0];
+      EXPECT_EQ(map.row_pitch, static_cast<int>(a.row_pitch));
+      EXPECT_EQ(map.column_pitch, static_cast<int>(a.column_pitch));
+      EXPECT_EQ(of_rows ? map.points_h : map.points_v, 1);
+      ASSERT_EQ(of_rows ? map.points_v : map.points_h, static_cast<int>(count));
+      for (std::uint32_t i = 0; i < count; ++i) {
+        const double place = (first + i * pitch + 0.5) / 24;
+        const double point = of_rows ? (place - map.origin_v) / map.spacing_v : (place - map.origin_h) / map.spacing_h;
+        EXPECT_NEAR(point, i, 1e-12);  // points: rounding
+        EXPECT_EQ(map.gain[i], 1 + 0.01F * static_cast<float>(i));
+      }
+      scale.parameters.resize(scale.parameters.size() - 4);
+      const RawFrame damaged = read_built(with(list2, {scale}));
+      EXPECT_TRUE(damaged.corrections.gain_maps.empty());
+      ASSERT_EQ(damaged.warnings.size(), 1u);
+      EXPECT_EQ(damaged.warnings[0].rfind(of_rows ? "ScalePerRow of" : "ScalePerColumn of", 0), 0U);
+    }
+  }
+}
+
+TEST(DngOpcodes, GainsOfAColourThatTheImageLacksAreNotApplied) {
+  MapFields fields;
+  fields.plane = 1;
+  const RawFrame frame = read_built(with(list2, {gain_map(fields)}));
+  EXPECT_TRUE(frame.corrections.gain_maps.empty());
+  ASSERT_EQ(frame.warnings.size(), 1u);
+  EXPECT_EQ(frame.warnings[0], "GainMap (OpcodeList2) is not applied: the image has no colour of its number");
+  DngBuilder mono = with(list3, {gain_map(fields)});
+  mono.monochrome = true;
+  EXPECT_TRUE(read_built(mono).corrections.gain_maps.empty());
+  fields.plane = 2;
+  DngBuilder colours = with(list2, {gain_map(fields)});
+  colours.samples = 3;
+  EXPECT_EQ(read_built(colours).corrections.gain_maps.size(), 1u);
+}
+
 TEST(DngOpcodes, AGainMapKeepsEveryField) {
   MapFields fields;
   fields.top = 1, fields.left = 0, fields.bottom = 23, fields.right = 100;
@@ -194,7 +244,7 @@ TEST(DngOpcodes, AConstantBeforeALinearizationTableIsNotSearchedAfterIt) {
 
 TEST(DngOpcodes, WhatIsNotAppliedIsNamed) {
   DngBuilder dng = with(list3, {words(1, std::vector<std::uint32_t>(14, 0)), words(2, {}), words(99, {1, 2})});
-  dng.set(list2, opcode_list({words(6, {0, 0, 24, 24}), words(7, {}), words(8, {}), words(10, {}), words(13, {})}));
+  dng.set(list2, opcode_list({words(6, {0, 0, 24, 24}), words(7, {}), words(8, {}), words(10, {}), words(11, {})}));
   dng.set(list1, opcode_list({gain_map({})}));
   const std::vector<std::string> expected = {
       "GainMap (OpcodeList1) is not applied: it is meant for values that still hold the black level",
@@ -202,7 +252,7 @@ TEST(DngOpcodes, WhatIsNotAppliedIsNamed) {
       "MapTable (OpcodeList2) is not applied",
       "MapPolynomial (OpcodeList2) is not applied",
       "DeltaPerRow (OpcodeList2) is not applied",
-      "ScalePerColumn (OpcodeList2) is not applied",
+      "DeltaPerColumn (OpcodeList2) is not applied",
       "WarpRectilinear (OpcodeList3) is not applied",
       "WarpFisheye (OpcodeList3) is not applied",
       "opcode 99 (OpcodeList3) is not applied"};
