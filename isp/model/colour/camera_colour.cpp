@@ -69,14 +69,15 @@ struct Bracket {
   const ColourCalibration* high;
 };
 
+/// Without two different temperatures that are known the calibration of the highest one is used, and the first if they
+/// are equal or unknown, as in Adobe's DNG SDK.
 Bracket bracket_of(const CameraColour& colour) {
   const auto& all = colour.calibrations;
-  const ColourCalibration* last_told = &all.back();
-  for (const ColourCalibration& c : all) {
-    if (c.cct_k > 0) last_told = &c;
+  if (all.size() >= 2 && all.front().cct_k > 0 && all.back().cct_k > all.front().cct_k) {
+    return {&all.front(), &all.back()};
   }
-  const bool two_told = all.size() >= 2 && all.front().cct_k > 0 && all.back().cct_k > all.front().cct_k;
-  return two_told ? Bracket{&all.front(), &all.back()} : Bracket{last_told, last_told};
+  const ColourCalibration* const only = &*std::ranges::max_element(all, {}, &ColourCalibration::cct_k);
+  return {only, only};
 }
 
 /// Returns the weight of the calibration with the higher temperature at a white: linear in 1/CCT, constant beyond the
