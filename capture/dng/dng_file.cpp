@@ -6,6 +6,7 @@
 
 #include "capture/dng/dng_tags.h"
 #include "capture/file/pass_on.h"
+#include "isp/base/text.h"
 
 namespace lowlux::capture {
 namespace {
@@ -65,6 +66,17 @@ Result<std::optional<TiffDirectory>> exif_of(const TiffFile& tiff, const TiffDir
   return fail(directory.error().code, std::string("the tag ") + tag::exif_ifd.name + ": " + directory.error().message);
 }
 
+/// Warns of a file that readers of the DNG versions known here may misread, as it states itself.
+void warn_of_version(const TiffDirectory& main, std::vector<std::string>& warnings) {
+  constexpr double known_major = 1, known_minor = 7;
+  const auto version = main.numbers(tag::dng_backward_version, 4, 4);
+  if (!version || !*version) return;
+  const double major = (**version)[0], minor = (**version)[1];
+  if (major < known_major || (major == known_major && minor <= known_minor)) return;
+  warnings.push_back("the file requires a reader of DNG " + number_text(major) + "." + number_text(minor) +
+                     ", lowlux knows 1.7: the image may be wrong");
+}
+
 }  // namespace
 
 std::string ignored(const Error& error) { return error.message + "; the tag is ignored"; }
@@ -86,6 +98,7 @@ Result<std::optional<DngFile>> open_dng(std::span<const std::byte> bytes) {
   std::stable_sort(dng.raw_images.begin(), dng.raw_images.end(),
                    [](const auto& a, const auto& b) { return area_of(a) > area_of(b); });
   dng.exif = or_ignored(exif_of(*tiff, dng.main), dng.warnings);
+  warn_of_version(dng.main, dng.warnings);
   return dng;
 }
 

@@ -138,6 +138,11 @@ bool is_jpeg_for_libraw(const TiffDirectory& directory, const DngImage& image, c
   return image.layout != SensorLayout::monochrome && (!width || *width <= image_width);
 }
 
+/// Returns whether a part begins as JPEG does. LibRaw leaves others black, and reads more forms than LosslessJpegRows.
+bool begins_jpeg(std::span<const std::byte> part) {
+  return part.size() > 2 && part[0] == std::byte{0xFF} && part[1] == std::byte{0xD8} && part[2] == std::byte{0xFF};
+}
+
 /// Returns the error of part i, which is damaged.
 tl::unexpected<Error> undecodable(const DngGrid& grid, std::size_t i) {
   return fail(ErrorCode::malformed, "the samples from column " + std::to_string(grid.left(i)) + ", row " +
@@ -185,9 +190,11 @@ Result<void> check_jpeg_samples(std::span<const std::byte> file, const TiffDirec
   if (!parts) return {};  // tiles that share bytes, which LibRaw reads
   isp::LosslessJpegRows rows(parts->storage, parts->row_samples);
   for (std::size_t i = 0; i < parts->grid.count; ++i) {
-    rows.open(parts->grid.at.part(file, i));
+    const auto part = parts->grid.at.part(file, i);
+    rows.open(part);
     const std::size_t needed = static_cast<std::size_t>(rows_in(*parts, image, i)) * parts->row_samples;
-    if (rows.samples() != 0 && rows.samples() < needed) return undecodable(parts->grid, i);
+    const bool is_other_jpeg = rows.samples() == 0 && begins_jpeg(part);
+    if (!is_other_jpeg && rows.samples() < needed) return undecodable(parts->grid, i);
   }
   return {};
 }

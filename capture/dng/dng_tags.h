@@ -42,6 +42,7 @@ inline constexpr TagName focal_length{37386, "FocalLength"};
 inline constexpr TagName ambient_temperature{37888, "AmbientTemperature"};
 
 inline constexpr TagName dng_version{50706, "DNGVersion"};
+inline constexpr TagName dng_backward_version{50707, "DNGBackwardVersion"};
 inline constexpr TagName unique_camera_model{50708, "UniqueCameraModel"};
 inline constexpr TagName cfa_plane_color{50710, "CFAPlaneColor"};
 inline constexpr TagName cfa_layout{50711, "CFALayout"};

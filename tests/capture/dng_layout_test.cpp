@@ -226,6 +226,18 @@ TEST(DngLayout, SamplesThatAreNotUnsignedIntegersOrFloatsAreRefused) {
   }
 }
 
+TEST(DngLayout, AFileForReadersOfAnUnknownVersionIsWarnedOf) {
+  for (const auto& [major, minor] : {std::pair{1.0, 0.0}, {1.0, 7.0}, {1.0, 8.0}, {2.0, 0.0}}) {
+    DngBuilder dng;
+    dng.set(50707, Tag::numbers(TagType::byte, {major, minor, 1, 0}));
+    if (major == 1 && minor <= 7) {
+      EXPECT_TRUE(read_built(dng).warnings.empty());
+    } else {
+      EXPECT_EQ(warned(dng).find("the file requires a reader of DNG"), 0U);
+    }
+  }
+}
+
 TEST(DngLayout, ReversedBytesAreRefusedWhereTheOrderOfBitsCounts) {
   for (const auto storage : {DngStorage::uncompressed, DngStorage::lossless_jpeg}) {
     DngBuilder dng;

@@ -309,6 +309,10 @@ TEST(StoredCodes, DamagedStorageIsOneClearLine) {
   strips.storage = DngStorage::lossless_jpeg;
   strips.rows_per_strip = 8;
   EXPECT_TRUE(has(test::refused(strips.remove(278)), "from column 0, row 0 on do not decode"));
+  DngBuilder other;  // one strip, which is for LibRaw
+  other.storage = DngStorage::lossless_jpeg;
+  other.stored_parts = {std::vector<std::byte>(2000, std::byte{0x12})};
+  EXPECT_TRUE(has(test::refused(other), "from column 0, row 0 on do not decode"));
   for (const DngStorage storage : {DngStorage::lossless_jpeg, DngStorage::tiled_lossless_jpeg}) {
     for (const double missing : {1, 12}) {  // rows that the parts of the last rows do not have
       DngBuilder low;
