@@ -101,10 +101,4 @@ void add_colour_drops(PlaneView<const float> differences, BayerPhase phase, cons
   });
 }
 
-std::array<ColourDensity, 3> colour_drop_density() {
-  constexpr float green_px = ColourDropRows::green_px, red_blue_px = ColourDropRows::red_blue_px;
-  const ColourDensity red_blue{0.25F, red_blue_px * red_blue_px / 4};
-  return {red_blue, {0.5F, green_px * green_px / 2}, red_blue};
-}
-
 }  // namespace lowlux::merge

@@ -37,7 +37,4 @@ void add_colour_drops(PlaneView<const float> differences, BayerPhase phase, cons
                       const RgbView<const float>& prediction, PlaneView<const std::uint8_t> block_matches,
                       ColourMean& mean, Executor& executor);
 
-/// Returns how densely add_colour_drops covers pixels, on average over all displacements: for R, G and B.
-std::array<ColourDensity, 3> colour_drop_density();
-
 }  // namespace lowlux::merge

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "isp/base/cfa.h"
 
@@ -80,21 +81,50 @@ void add_run(const float* value, const WeightOf& weight_of, int first, int last,
 constexpr float weight_steps = 256;  // of the weights of ColourMean
 constexpr double least_ratio = 1.0 / 64;
 
-/// Returns the variance of pixels of a colour with a mean weight as it is seen in means of larger areas, over that of a
-/// sample: at most that of one frame. Each sample weighs as much as others there, whatever the weights of the pixels.
-/// @param weight  in steps, > 0
-double colour_variance(double weight, const ColourDensity& of) {
-  return std::min(1.0, weight_steps * of.mean_weight / weight) / of.samples_per_px;
+/// Returns the row of a block in which its frames are counted.
+int counted_row(int block_row, int height) { return std::min(block_row * block_px + block_px / 2, height - 1); }
+
+/// Returns whether a frame has samples at half of a run of pixels at least, of any colour.
+bool covers(const ColourRowSums& row, int first, int last) {
+  int covered = 0;
+  for (int x = first; x < last; ++x) covered += row.weight[0][x] + row.weight[1][x] + row.weight[2][x] > 0 ? 1 : 0;
+  return 2 * covered >= last - first;
 }
 
-double mean_of_block(const Plane<std::uint16_t>& plane, int column, int row) {
-  const int right = std::min((column + 1) * block_px, plane.width());
-  const int bottom = std::min((row + 1) * block_px, plane.height());
-  double sum = 0;
-  for (int y = row * block_px; y < bottom; ++y) {
-    for (int x = column * block_px; x < right; ++x) sum += plane.at(x, y);
+/// Computes how far the mean of the pixels of a row is that of their samples, 0..1, rather than the prediction: 0
+/// without a sample, and 1 from a quarter of the mean weight around on, which is sum k t / sum k with k = (1 2 1)' (1 2
+/// 1). In each 2x2 cell around a pixel, k weighs all four pixels equally.
+class SampleShares {
+ public:
+  explicit SampleShares(int width) : column_(static_cast<std::size_t>(width) + 2), share_(column_.size() - 2) {}
+
+  const std::vector<float>& row(const Plane<std::uint16_t>& weight, int y) {
+    const std::uint16_t* const here = weight.row(y);
+    const std::uint16_t* const above = weight.row(std::max(y - 1, 0));
+    const std::uint16_t* const below = weight.row(std::min(y + 1, weight.height() - 1));
+    for (int x = 0; x < weight.width(); ++x) {
+      column_[x + 1] = static_cast<float>(above[x]) + 2.0F * static_cast<float>(here[x]) + static_cast<float>(below[x]);
+    }
+    column_.front() = column_[1];
+    column_.back() = column_[column_.size() - 2];
+    for (std::size_t x = 0; x < share_.size(); ++x) {
+      const float around = (column_[x] + 2 * column_[x + 1] + column_[x + 2]) / 16;
+      share_[x] = std::min(static_cast<float>(here[x]) / std::max(full_share * around, 1.0F), 1.0F);
+    }
+    return share_;
   }
-  return sum / (static_cast<double>(right - column * block_px) * (bottom - row * block_px));
+
+ private:
+  static constexpr float full_share = 0.25F;
+
+  std::vector<float> column_, share_;
+};
+
+/// Returns the variance of a colour over that of a sample in the mean of a larger area.
+/// @param share  mean share of samples (SampleShares)
+double colour_variance(double share, double frames, std::size_t colour) {
+  const double samples_per_px = colour == 1 ? 0.5 : 0.25;
+  return share * share / (frames * samples_per_px);
 }
 
 }  // namespace
@@ -154,16 +184,18 @@ Plane<float> MosaicMean::take_mean(Executor& executor) {
   return mean;
 }
 
-ColourMean::ColourMean(int width, int height, const std::array<ColourDensity, 3>& density) : density_(density) {
+ColourMean::ColourMean(int width, int height) : frames_(ratio_blocks(width, block_px), ratio_blocks(height, block_px)) {
   for (std::size_t c = 0; c < 3; ++c) {
     sum_[c] = Plane<float>(width, height);
     weight_[c] = Plane<std::uint16_t>(width, height);
     std::fill_n(sum_[c].data(), sum_[c].size(), 0.0F);
     std::fill_n(weight_[c].data(), weight_[c].size(), std::uint16_t{0});
   }
+  std::fill_n(frames_.data(), frames_.size(), std::uint8_t{0});
 }
 
 void ColourMean::add_row(int y, const ColourRowSums& row, PlaneView<const std::uint8_t> block_matches) {
+  const bool counts = y == counted_row(y / block_px, height());
   for_matching(y, width(), block_matches, [&](int first, int last) {
     for (std::size_t c = 0; c < 3; ++c) {
       const float *const value = row.value[c], *const more = row.weight[c];
@@ -174,31 +206,43 @@ void ColourMean::add_row(int y, const ColourRowSums& row, PlaneView<const std::u
         weight[x] = static_cast<std::uint16_t>(weight[x] + static_cast<int>(weight_steps * more[x]));
       }
     }
+    for (int x = first; counts && x < last; x += block_px) {
+      if (covers(row, x, std::min(x + block_px, last))) ++frames_.at(x / block_px, y / block_px);
+    }
   });
 }
 
 std::array<double, 3> ColourMean::variance(Executor& executor) const {
+  struct Sum {
+    std::array<double, 3> share{};
+    double frames = 0, pixels = 0;
+  };
+  std::vector<Sum> of_row(static_cast<std::size_t>(height()));
+  for_each_band(executor, height(), [&](RowBand band, int) {
+    SampleShares shares(width());
+    for (int y = band.first; y < band.last; ++y) {
+      Sum& sum = of_row[static_cast<std::size_t>(y)];
+      const std::uint8_t* const frames = frames_.row(y / block_px);
+      for (int x = 0; x < width(); ++x) {
+        sum.frames += frames[x / block_px];
+        sum.pixels += frames[x / block_px] > 0 ? 1 : 0;
+      }
+      for (std::size_t c = 0; c < 3; ++c) {
+        const std::vector<float>& share = shares.row(weight_[c], y);
+        for (int x = 0; x < width(); ++x) sum.share[c] += frames[x / block_px] > 0 ? static_cast<double>(share[x]) : 0;
+      }
+    }
+  });
+  Sum all;
+  for (const Sum& sum : of_row) {
+    for (std::size_t c = 0; c < 3; ++c) all.share[c] += sum.share[c];
+    all.frames += sum.frames;
+    all.pixels += sum.pixels;
+  }
   std::array<double, 3> out{};
   for (std::size_t c = 0; c < 3; ++c) {
-    const Plane<std::uint16_t>& plane = weight_[c];
-    /// The sum of the weights of pixels that have any, and their number.
-    struct Sum {
-      double weight = 0, pixels = 0;
-    };
-    std::vector<Sum> of_row(static_cast<std::size_t>(height()));
-    for_each_index(executor, height(), [&](int y) {
-      Sum& sum = of_row[static_cast<std::size_t>(y)];
-      for (int x = 0; x < width(); ++x) {
-        sum.weight += plane.at(x, y);
-        sum.pixels += plane.at(x, y) > 0 ? 1 : 0;
-      }
-    });
-    Sum all;
-    for (const Sum& sum : of_row) {
-      all.weight += sum.weight;
-      all.pixels += sum.pixels;
-    }
-    out[c] = colour_variance(all.pixels > 0 ? all.weight / all.pixels : 1, density_[c]);
+    out[c] = all.share[c] > 0 ? colour_variance(all.share[c] / all.pixels, all.frames / all.pixels, c)
+                              : colour_variance(1, 1, c);
   }
   return out;
 }
@@ -207,27 +251,36 @@ ColourMean::Image ColourMean::image(const RowBand& rows, const std::array<double
                                     const RgbView<const float>& prediction, Executor& executor) const {
   assert(rows.first % block_px == 0 && (rows.last % block_px == 0 || rows.last == height()));
   Image out{.samples = Plane<float>(3 * width(), rows.last - rows.first), .noise_ratio = {.block_px = block_px}};
-  for_each_index(executor, rows.last - rows.first, [&](int row) {
-    const int y = rows.first + row;
-    float* const samples = out.samples.row(row);
-    for (std::size_t c = 0; c < 3; ++c) {
-      for (int x = 0; x < width(); ++x) {
-        const float weight = weight_[c].at(x, y);
-        samples[3 * static_cast<std::size_t>(x) + c] =
-            weight > 0 ? weight_steps * sum_[c].at(x, y) / weight : prediction[c].at(x, y);
+  Plane<float>& ratio = out.noise_ratio.ratio;
+  ratio = Plane<float>(frames_.width(), ratio_blocks(rows.last - rows.first, block_px));
+  for_each_index(executor, ratio.height(), [&](int block_row) {
+    const RowBand band{rows.first + block_row * block_px, std::min(rows.first + (block_row + 1) * block_px, rows.last)};
+    const std::uint8_t* const frames = frames_.row(band.first / block_px);
+    std::vector<std::array<double, 3>> share_sum(static_cast<std::size_t>(ratio.width()));
+    SampleShares shares(width());
+    for (int y = band.first; y < band.last; ++y) {
+      float* const samples = out.samples.row(y - rows.first);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const std::vector<float>& share = shares.row(weight_[c], y);
+        const std::uint16_t* const weight = weight_[c].row(y);
+        const float *const sum = sum_[c].row(y), *const predicted = prediction[c].row(y);
+        for (int x = 0; x < width(); ++x) {
+          float& value = samples[3 * static_cast<std::size_t>(x) + c];
+          value = predicted[x];
+          if (weight[x] == 0 || frames[x / block_px] == 0) continue;
+          value += share[x] * (weight_steps * sum[x] / static_cast<float>(weight[x]) - predicted[x]);
+          share_sum[static_cast<std::size_t>(x / block_px)][c] += static_cast<double>(share[x]);
+        }
       }
     }
-  });
-  Plane<float>& ratio = out.noise_ratio.ratio;
-  ratio = Plane<float>(ratio_blocks(width(), block_px), ratio_blocks(rows.last - rows.first, block_px));
-  for_each_index(executor, ratio.height(), [&](int row) {
     for (int column = 0; column < ratio.width(); ++column) {
+      const double pixels = (std::min((column + 1) * block_px, width()) - column * block_px) * (band.last - band.first);
       double sum = 0;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const double weight = mean_of_block(weight_[c], column, rows.first / block_px + row);
-        if (weight > 0) sum += colour_variance(weight, density_[c]) / variance[c];
+      for (std::size_t c = 0; c < 3 && frames[column] > 0; ++c) {
+        sum +=
+            colour_variance(share_sum[static_cast<std::size_t>(column)][c] / pixels, frames[column], c) / variance[c];
       }
-      ratio.at(column, row) = static_cast<float>(std::max(sum / 3, least_ratio));
+      ratio.at(column, block_row) = static_cast<float>(std::max(sum / 3, least_ratio));
     }
   });
   return out;

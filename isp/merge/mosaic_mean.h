@@ -63,21 +63,18 @@ struct ColourRowSums {
   std::array<const float*, 3> weight{};  // sum t, in multiples of 1/256, at most 1
 };
 
-/// States how densely one frame covers the pixels with samples of a colour.
-struct ColourDensity {
-  float samples_per_px;
-  float mean_weight;  // of a pixel, ColourRowSums::weight
-};
-
 /// Adds frames at every pixel for each of three colours, and returns their mean: over frames that are displaced against
 /// each other, every pixel gets samples of each colour. Memory does not depend on their number: 18 bytes for each
 /// pixel.
+///
+/// Where displacements do not cover the pixels evenly, those of few samples keep a part of the prediction, and those
+/// without any all of it. A sample then counts for no pixel more than for others, and over larger areas the variance is
+/// that of the number of samples times the square of the mean share that samples have in pixels.
 class ColourMean {
  public:
   static constexpr int max_frames = 255;  // whose weights the sums can hold
 
-  /// @param density  of the frames, for R, G and B
-  ColourMean(int width, int height, const std::array<ColourDensity, 3>& density);
+  ColourMean(int width, int height);
 
   int width() const { return sum_[0].width(); }
   int height() const { return sum_[0].height(); }
@@ -86,14 +83,15 @@ class ColourMean {
   /// @param block_matches  as in Comparison; without data all count
   void add_row(int y, const ColourRowSums& row, PlaneView<const std::uint8_t> block_matches);
 
-  /// Returns the variance of R, G, B over that of a sample, as it is seen in means of larger areas.
+  /// Returns the variance of R, G, B over that of a sample, as it is seen in means of larger areas. The noise of the
+  /// prediction counts as small.
   std::array<double, 3> variance(Executor& executor) const;
 
   struct Image {
     Plane<float> samples;    // R, G, B of each pixel, interleaved
     NoiseRatio noise_ratio;  // of the variance of a block to variance()
   };
-  /// Returns the mean of some rows. Values without samples are those of the prediction, whose noise counts as small.
+  /// Returns the mean of some rows. Values without samples are those of the prediction.
   /// @param rows      begin at a block, and end at one or at the last row
   /// @param variance  variance()
   Image image(const RowBand& rows, const std::array<double, 3>& variance, const RgbView<const float>& prediction,
@@ -102,7 +100,7 @@ class ColourMean {
  private:
   std::array<Plane<float>, 3> sum_;
   std::array<Plane<std::uint16_t>, 3> weight_;  // in multiples of 1/256
-  std::array<ColourDensity, 3> density_;
+  Plane<std::uint8_t> frames_;                  // of each block
 };
 
 }  // namespace lowlux::merge

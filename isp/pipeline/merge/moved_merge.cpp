@@ -226,7 +226,7 @@ void MovedMerge::begin_sum() {
     mean_.emplace(work_.width, work_.height);
   }
   if (averages_differences() && will_predict_again(1, work_.count)) {
-    colours_.emplace(work_.width, work_.height, merge::colour_drop_density());
+    colours_.emplace(work_.width, work_.height);
   }
 }
 

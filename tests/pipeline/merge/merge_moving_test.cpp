@@ -128,7 +128,8 @@ TEST(MergeMoving, ADarkFrameCountsOncePerFrame) {
 }
 
 // Frames displaced by whole cells show each pixel in one colour; the others are those of the first prediction. By the
-// developed mosaic of their mean instead, the gain is 12.9 dB.
+// developed mosaic of their mean instead, the gain is 12.9 dB, and with the noise of frames that cover all
+// colours 13.3.
 TEST(MergeMoving, FramesThatDoNotCoverAllColoursGainToo) {
   constexpr int frames = 32;
   Burst burst = hand_held(20);
@@ -137,7 +138,7 @@ TEST(MergeMoving, FramesThatDoNotCoverAllColoursGainToo) {
   const MergedRaw merged = burst.merged(frames, {.alignment = MergeAlignment::subpixel});
   const double gain_db = 10 * std::log10(single / burst.mean_square_error(merged.frame, middle));
   std::printf("gain of %d frames displaced by whole cells: %.2f dB\n", frames, gain_db);
-  EXPECT_GT(gain_db, 13.1);
+  EXPECT_GT(gain_db, 13.35);
 }
 
 /// Shades the corners of a frame to a share of its light, and states the gain that corrects it. Saturated pixels stay.

@@ -31,7 +31,7 @@ Burst scene(int width, int height) {
 
 /// Returns the mean of noisy frames whose displacements cover every pixel in all colours.
 merge::ColourMean mean_of_frames(const Burst& burst, const CameraRgb& nothing) {
-  merge::ColourMean mean(burst.width, burst.height, merge::colour_drop_density());
+  merge::ColourMean mean(burst.width, burst.height);
   for (int i = 0; i < frames; ++i) {
     const double dx = 0.37 * i - 2, dy = 0.61 * i - 3;
     Plane<float> expected(burst.width, burst.height);
