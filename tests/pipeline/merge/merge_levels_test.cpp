@@ -22,19 +22,6 @@ struct Levels {
   double black_dn, white_dn;
 };
 
-/// Encodes a frame anew with other levels, and the same gain [DN/e-].
-void change_levels(RawFrame& frame, const Levels& levels) {
-  for (std::size_t i = 0; i < frame.raw.dn.size(); ++i) {
-    const double dn = frame.raw.dn.data()[i] + levels.black_dn - test::night_black_dn;
-    frame.raw.dn.data()[i] = static_cast<std::uint16_t>(std::clamp(dn, 0.0, levels.white_dn));
-  }
-  const double unit = (test::night_white_dn - test::night_black_dn) / (levels.white_dn - levels.black_dn);
-  frame.raw.black_tag->pattern_dn = {levels.black_dn};
-  frame.raw.white_dn.fill(levels.white_dn);
-  for (double& scale : frame.noise->scale) scale *= unit;
-  for (double& offset : frame.noise->offset) offset *= unit * unit;
-}
-
 TEST(MergeLevels, FramesOfDifferentBlackAndWhiteLevelsAreAveragedByTheirLight) {
   constexpr std::uint64_t seed = 27;
   std::mt19937_64 draw(seed);
@@ -44,7 +31,10 @@ TEST(MergeLevels, FramesOfDifferentBlackAndWhiteLevelsAreAveragedByTheirLight) {
     Burst burst{.width = 160, .height = 128, .mean_e = level_e};
     std::vector<Levels> levels(4);
     for (Levels& one : levels) one = {std::round(black(draw)), std::round(white(draw))};
-    burst.disturb = [&](RawFrame& frame, int index) { change_levels(frame, levels[static_cast<std::size_t>(index)]); };
+    burst.disturb = [&](RawFrame& frame, int index) {
+      const auto [black_dn, white_dn] = levels[static_cast<std::size_t>(index)];
+      test::change_levels(frame, black_dn, white_dn);
+    };
     const double white_e = (levels[0].white_dn - levels[0].black_dn) / test::night_gain_dn_per_e;
     const double scene_e = burst.mean_truth_e();
     for (const MergeWay& way : test::ways_without_stars()) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,19 @@ inline Result<isp::MergedRaw> tried(const Burst& burst, int count, const isp::Me
     return Result<isp::FrameToMerge>({burst.frame(index), burst.options(), "frame " + std::to_string(index)});
   };
   return merge_frames(count, read, options, one);
+}
+
+/// Encodes a frame anew with other black and white levels [DN], and the same gain [DN/e-].
+inline void change_levels(RawFrame& frame, double black_dn, double white_dn) {
+  for (std::size_t i = 0; i < frame.raw.dn.size(); ++i) {
+    const double dn = frame.raw.dn.data()[i] + black_dn - night_black_dn;
+    frame.raw.dn.data()[i] = static_cast<std::uint16_t>(std::clamp(dn, 0.0, white_dn));
+  }
+  const double unit = (night_white_dn - night_black_dn) / (white_dn - black_dn);
+  frame.raw.black_tag->pattern_dn = {black_dn};
+  frame.raw.white_dn.fill(white_dn);
+  for (double& scale : frame.noise->scale) scale *= unit;
+  for (double& offset : frame.noise->offset) offset *= unit * unit;
 }
 
 /// Returns the mean signal over all samples [e-].
