@@ -31,7 +31,7 @@ constexpr ResidualShares residual_fractions(PlaneKind kind, int pass, int step, 
   };
   const int recipe = pass == 0 ? 0 : step == 4 ? 1 : 2;
   constexpr Other other[2][3] = {{{68.1e-6f, 2.5e-6f}, {42.1e-6f, 4.0e-6f}, {21.4e-6f, 1.2e-6f}},
-                                 {{9.2e-6f, 3.6e-6f}, {9.7e-6f, 4.1e-6f}, {7.8e-6f, 1.9e-6f}}};
+                                 {{9.8e-6f, 4.0e-6f}, {9.6e-6f, 4.1e-6f}, {7.7e-6f, 1.9e-6f}}};
   const Other& o = other[kind == PlaneKind::luma ? 0 : 1][recipe];
   const float mean = (recipe == 2 ? 0.473f : 0.634f) / 64;
   return {level == 0 ? 1.0f / 64 : 0.25f / 64, level == 0 ? o.finest : o.coarser, level + 1 == levels ? mean : 0};

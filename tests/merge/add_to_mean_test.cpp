@@ -135,7 +135,7 @@ double whole(std::mt19937_64& draw, int largest) { return std::uniform_int_distr
 
 // White noise of variance 1 around a linear prediction, in 15 and 31 frames: sums over windows of 32 x 32 pixels have
 // the stated variance, whether or not the displacements cover the pixels in all colours. What unequal weights add is
-// not stated: up to a fifth of the variance, where displacements are few or small.
+// not stated: up to a quarter of the variance, where displacements are few or small.
 TEST(AddColourDrops, TheNoiseIsAsStatedForAllDisplacements) {
   constexpr int side = 288, border = 48, window = 32, seeds = 4;
   const Plane<float> dark = test::flat_mosaic(side, side, 0);

@@ -191,7 +191,7 @@ double faint_power(int p, const std::array<Block, 4>& f, const std::array<double
     }
   }
   if (sum_shape2 == 0) return 0;
-  const double margin = p == 0 ? 2 : 3, factor = p == 0 ? 1 : 4;
+  const double margin = p == 0 ? 2 : 4, factor = p == 0 ? 1 : 4;
   return factor * std::max(0.0, excess / sum_shape2 - margin * variance[p] * std::sqrt(2 / sum_shape2));
 }
 
