@@ -23,8 +23,8 @@ Result<void> check_row_image(const TiffDirectory& directory, const DngImage& ima
 /// tiles of a coloured image that are not wider than the image.
 bool is_for_libraw(const TiffDirectory& directory, const DngImage& image, std::size_t file_bytes);
 
-/// Returns the error of an image in lossless JPEG of which a strip or tile is no JPEG or has fewer samples than its
-/// rows. LibRaw would leave the others black.
+/// Returns an error if a strip or tile of an image in lossless JPEG does not contain a JPEG image, or one with fewer
+/// samples than its rows have. LibRaw would leave the missing ones black.
 Result<void> check_jpeg_samples(std::span<const std::byte> file, const TiffDirectory& directory, const DngImage& image);
 
 /// Both decode an image that check_row_image accepts, to height x (width * samples).
