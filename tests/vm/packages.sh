@@ -23,3 +23,17 @@ unpack() {
   for package in ./*.deb; do dpkg-deb -x "$package" "$1"; done
   rm ./*.deb
 }
+
+# fetch_source PACKAGE RELEASE: unpacks the source package of a release of Debian into a new folder of the one it is called
+# in, whatever releases apt is configured for, from the archive that apt uses
+fetch_source() {
+  local archive options
+  archive=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Origin: Debian' 'Label: Debian' | head -n 1)
+  [ -n "$archive" ] || none "apt is configured for no archive of Debian"
+  mkdir -p lists/partial
+  echo "deb-src $archive $2 main" >sources.list
+  options=(-q -o Dir::Etc::SourceList="$PWD/sources.list" -o Dir::Etc::SourceParts=- -o Dir::State::Lists="$PWD/lists"
+    -o Dir::Cache::pkgcache= -o Dir::Cache::srcpkgcache= -o APT::Sandbox::User=root)
+  { apt-get "${options[@]}" update && apt-get "${options[@]}" --only-source source "$1"; } >source.log 2>&1 ||
+    none "no source package $1 of $2 from $archive: $(grep -m 1 '^E:' source.log || tail -n 1 source.log)"
+}
