@@ -2,34 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 
 #include "isp/base/cfa.h"
+#include "isp/base/gain_at.h"
 
 namespace lowlux::isp {
 namespace {
-
-// Holds a pixel's position on the map's grid: the point before it, the point after it and the weight of the latter.
-struct GridPosition {
-  int before;
-  int after;
-  float weight;
-};
-
-GridPosition grid_position(double relative, double origin, double spacing, int points) {
-  const double at = points > 1 && spacing > 0 ? std::clamp((relative - origin) / spacing, 0.0, points - 1.0) : 0.0;
-  const int before = static_cast<int>(at);
-  return {before, std::min(before + 1, points - 1), static_cast<float>(at - before)};
-}
-
-float gain_at(const GainMap& map, const GridPosition& v, const GridPosition& h, int map_plane) {
-  const auto point = [&](int row, int column) {
-    return map.gain[(static_cast<std::size_t>(row) * map.points_h + column) * map.map_planes + map_plane];
-  };
-  const float top = point(v.before, h.before) * (1 - h.weight) + point(v.before, h.after) * h.weight;
-  const float bottom = point(v.after, h.before) * (1 - h.weight) + point(v.after, h.after) * h.weight;
-  return top * (1 - v.weight) + bottom * v.weight;
-}
 
 // Returns the first index >= start in start + k * pitch that is >= at.
 int aligned_up(int start, int pitch, int at) {
@@ -37,38 +15,26 @@ int aligned_up(int start, int pitch, int at) {
 }
 
 void multiply(const GainMap& map, int plane, const FramePlace& place, PlaneView<float> out, Executor& executor) {
-  const int map_plane = std::min(plane - map.first_plane, map.map_planes - 1);
   const int bottom = std::min(map.bottom, place.frame_height);
   const int right = std::min({map.right, place.frame_width, place.x + out.width});
   for_each_band(executor, out.height, [&](RowBand band, int) {
     const int end = std::min(place.y + band.last, bottom);
     for (int y = aligned_up(map.top, map.row_pitch, place.y + band.first); y < end; y += map.row_pitch) {
-      const GridPosition v = grid_position((y + 0.5) / place.frame_height, map.origin_v, map.spacing_v, map.points_v);
+      const GridPosition v = row_position(map, y, place.frame_height);
       float* row = out.row(y - place.y);
       for (int x = aligned_up(map.left, map.column_pitch, place.x); x < right; x += map.column_pitch) {
-        const GridPosition h = grid_position((x + 0.5) / place.frame_width, map.origin_h, map.spacing_h, map.points_h);
-        row[x - place.x] *= gain_at(map, v, h, map_plane);
+        row[x - place.x] *= gain_at(map, v, column_position(map, x, place.frame_width), plane);
       }
     }
   });
 }
 
 void multiply(const RadialGain& gain, const FramePlace& place, PlaneView<float> out, Executor& executor) {
-  const double centre_x = gain.centre_x * (place.frame_width - 1);
-  const double centre_y = gain.centre_y * (place.frame_height - 1);
-  const double far_x = std::max(centre_x, place.frame_width - 1 - centre_x);
-  const double far_y = std::max(centre_y, place.frame_height - 1 - centre_y);
-  const double far2 = std::max(far_x * far_x + far_y * far_y, 1e-12);
+  const RadialGainAt gain_at(gain, place.frame_width, place.frame_height);
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
-      const double dy = place.y + y - centre_y;
       float* row = out.row(y);
-      for (int x = 0; x < out.width; ++x) {
-        const double dx = place.x + x - centre_x;
-        const double r2 = (dx * dx + dy * dy) / far2;
-        const double* k = gain.k;
-        row[x] *= static_cast<float>(1 + r2 * (k[0] + r2 * (k[1] + r2 * (k[2] + r2 * (k[3] + r2 * k[4])))));
-      }
+      for (int x = 0; x < out.width; ++x) row[x] *= static_cast<float>(gain_at(place.x + x, place.y + y));
     }
   });
 }
