@@ -14,7 +14,6 @@
 #include "capture/dng/dng_image.h"
 #include "capture/dng/dng_info.h"
 #include "capture/dng/dng_levels.h"
-#include "capture/dng/dng_lossy.h"
 #include "capture/dng/dng_opcodes.h"
 #include "capture/dng/dng_tags.h"
 #include "capture/file/decoder_frame.h"
@@ -112,20 +111,30 @@ void warn_of_user_crop(const DngFile& dng, const TiffDirectory& directory, Orien
                      " keeps the part that the camera was set to");
 }
 
-/// Returns the directory with an opcode list: that of the raw image, where DNG requires it, or the first one.
-const TiffDirectory& directory_of_list(const DngFile& dng, const TiffDirectory& directory, int list) {
-  return directory.find(tag::opcode_list[list - 1]) != nullptr ? directory : dng.main;
+/// Returns the directory that has an opcode list: that of the raw image, where DNG requires it, or the first one; null
+/// if there is none.
+const TiffDirectory* directory_of_list(const DngFile& dng, const DngDescription& described, int list) {
+  for (const TiffDirectory* directory : {described.directory, &dng.main}) {
+    if (directory->find(tag::opcode_list[list - 1]) != nullptr) return directory;
+  }
+  return nullptr;
 }
 
-void read_corrections(const DngFile& dng, const TiffDirectory& directory, SampleState samples, RawFrame& frame) {
-  for (int list = 1; list <= 3; ++list) {
-    const TagName name = tag::opcode_list[list - 1];
-    const TiffDirectory& home = directory_of_list(dng, directory, list);
-    if (home.find(name) == nullptr) continue;
-    auto read = home.bytes(name).and_then(
-        [&](std::span<const std::byte> bytes) { return read_opcodes(bytes, list, samples, frame); });
-    if (!read) frame.warnings.push_back(ignored(read.error()));
+/// Reads an opcode list, if there is one. A damaged list is ignored with a warning, unless it makes linear values of
+/// the codes: without it the image would be wrong.
+Result<void> read_list(const DngFile& dng, const DngDescription& described, int list, RawFrame& frame) {
+  const TiffDirectory* const directory = directory_of_list(dng, described, list);
+  if (directory == nullptr) return {};
+  bool is_last = true;
+  for (int later = list + 1; later <= 3; ++later) {
+    is_last = is_last && directory_of_list(dng, described, later) == nullptr;
   }
+  auto read = directory->bytes(tag::opcode_list[list - 1]).and_then([&](std::span<const std::byte> bytes) {
+    return read_opcodes(bytes, list, is_last, described.image, frame);
+  });
+  if (read || (list == 2 && is_encoded(described.image))) return read;
+  frame.warnings.push_back(ignored(read.error()));
+  return {};
 }
 
 /// Returns whether the file states a version of DNG before 1.1.
@@ -134,19 +143,34 @@ bool is_dng_1_0(const DngFile& dng) {
   return version && *version && (**version)[0] == 1 && (**version)[1] == 0;
 }
 
-/// Finishes a frame that has its samples.
-Result<RawFrame> finished(const DngFile& dng, const DngDescription& described, RawFrame frame, const XTransUse& use,
-                          bool has_linear_codes = false) {
+/// Makes linear samples of those that the file stores: opcodes of the first list, LinearizationTable, other opcodes.
+Result<void> linearize(const DngFile& dng, const DngDescription& described, RawFrame& frame) {
+  const TiffDirectory& directory = *described.directory;
+  return read_list(dng, described, 1, frame)
+      .and_then([&]() -> Result<void> {
+        if (!frame.raw.is_float()) return apply_linearization_table(directory, frame.raw.dn);
+        if (directory.find(tag::linearization_table) != nullptr) {
+          frame.warnings.emplace_back("LinearizationTable is not applied: the samples are floating-point numbers");
+        }
+        return {};
+      })
+      .and_then([&] { return read_list(dng, described, 2, frame); })
+      .and_then([&] { return read_list(dng, described, 3, frame); })
+      .and_then([&]() -> Result<void> {
+        auto unusable = frame.raw.is_float() ? unusable_sample(frame.raw) : std::nullopt;
+        if (unusable) return fail(ErrorCode::malformed, *std::move(unusable));
+        return {};
+      });
+}
+
+/// Finishes a frame that has the samples that the file stores.
+Result<RawFrame> finished(const DngFile& dng, const DngDescription& described, RawFrame frame, const XTransUse& use) {
   const TiffDirectory& directory = *described.directory;
   const std::optional<XTransPhase>& x_trans = described.image.x_trans;
   if (frame.colour.calibrations.empty() && frame.raw.layout != SensorLayout::monochrome) {
     if (auto sound = check_colour_matrices(dng, directory); !sound) return pass_on(sound);
   }
-  const bool linearized = has_linear_codes || directory.find(tag::linearization_table) != nullptr;
-  if (x_trans) frame.raw.layout = SensorLayout::linear_rgb;  // whose gains are wanted
-  read_corrections(dng, directory,
-                   {.linearized = linearized, .polynomials = has_linear_codes, .is_x_trans = x_trans.has_value()},
-                   frame);
+  if (auto linear = linearize(dng, described, frame); !linear) return pass_on(linear);
   ignore_impossible_white(frame.colour, frame.warnings);
   if (x_trans) {
     if (auto used = use_mosaic(frame, *x_trans, use); !used) return pass_on(used);
@@ -194,33 +218,17 @@ Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std:
   return finished(dng, *chosen, std::move(frame), use);
 }
 
-Result<RawFrame> complete_linearized_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes,
-                                         const XTransUse& use) {
-  RawFrame frame = std::move(described.frame);
-  const TiffDirectory& directory = *described.directory;
-  frame.raw.dn = std::move(codes);
-  auto linear = linearize_codes(directory, directory_of_list(dng, directory, 2), described.image.bits, frame.raw);
-  if (!linear) return pass_on(linear);
-  return finished(dng, described, std::move(frame), use, true);
-}
-
-Result<RawFrame> complete_code_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes,
-                                   const XTransUse& use) {
+Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes,
+                              const XTransUse& use) {
   RawFrame frame = std::move(described.frame);
   frame.raw.dn = std::move(codes);
-  auto linear = apply_linearization_table(*described.directory, described.image.bits, frame.raw.dn);
-  if (!linear) return pass_on(linear);
   return finished(dng, described, std::move(frame), use);
 }
 
-Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described, Plane<float> samples,
-                                    const XTransUse& use) {
+Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, Plane<float> samples,
+                              const XTransUse& use) {
   RawFrame frame = std::move(described.frame);
   frame.raw.dn_float = std::move(samples);
-  if (auto unusable = unusable_sample(frame.raw)) return fail(ErrorCode::malformed, *std::move(unusable));
-  if (described.directory->find(tag::linearization_table) != nullptr) {
-    frame.warnings.emplace_back("LinearizationTable is not applied: the samples are floating-point numbers");
-  }
   return finished(dng, described, std::move(frame), use);
 }
 

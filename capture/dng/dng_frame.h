@@ -19,23 +19,20 @@ struct DngDescription {
 /// Reads and checks the tags of a raw image, one of `dng.raw_images`.
 Result<DngDescription> describe_dng(const DngFile& dng, const TiffDirectory& raw_image, std::size_t file_bytes);
 
-/// Adds the samples to the frame, and what only the decoder knows. An X-Trans mosaic is used as use_mosaic states.
+/// Adds the codes that LibRaw delivers, without LinearizationTable, to the frame, and what only the decoder knows. They
+/// become linear samples, and an X-Trans mosaic is used as use_mosaic states.
 /// `described` is the raw image expected; if the decoder chose another one of its size, that one is described instead.
 /// Without a colour matrix in the file the decoder's table is used, if it has the camera.
 Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, std::size_t file_bytes, DecodedRaw decoded,
                               const XTransUse& use = {});
 
-/// Adds the samples of an image in lossy JPEG or JPEG XL, given its codes. Errors: those of linearize_codes.
-Result<RawFrame> complete_linearized_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes,
-                                         const XTransUse& use = {});
-
-/// Adds the samples of an image of integers that LibRaw did not decode, given its codes, to which LinearizationTable is
-/// applied. Errors: a damaged table.
-Result<RawFrame> complete_code_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes,
-                                   const XTransUse& use = {});
+/// Adds the codes of an image that LibRaw did not decode. Errors: a damaged LinearizationTable; an OpcodeList2 that is
+/// damaged, if is_encoded.
+Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, Plane<std::uint16_t> codes,
+                              const XTransUse& use = {});
 
 /// Adds floating-point samples to the frame. Errors: those of unusable_sample (isp/base/float_samples.h).
-Result<RawFrame> complete_float_dng(const DngFile& dng, DngDescription described, Plane<float> samples,
-                                    const XTransUse& use = {});
+Result<RawFrame> complete_dng(const DngFile& dng, DngDescription described, Plane<float> samples,
+                              const XTransUse& use = {});
 
 }  // namespace lowlux::capture

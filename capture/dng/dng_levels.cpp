@@ -262,4 +262,18 @@ Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, 
   return check_levels(raw, "tags WhiteLevel and BlackLevel");
 }
 
+Result<void> apply_linearization_table(const TiffDirectory& directory, Plane<std::uint16_t>& codes) {
+  constexpr std::size_t all_codes = 65536;
+  auto table = directory.numbers(tag::linearization_table, 1, all_codes);
+  if (!table) return pass_on(table);
+  if (!*table) return {};
+  if (auto finite = check_finite(**table, tag::linearization_table); !finite) return finite;
+  std::vector<std::uint16_t> linear;
+  for (const double dn : **table) linear.push_back(static_cast<std::uint16_t>(std::clamp(dn, 0.0, max_level_dn)));
+  linear.resize(all_codes, linear.back());
+  std::transform(codes.data(), codes.data() + codes.size(), codes.data(),
+                 [&](std::uint16_t code) { return linear[code]; });
+  return {};
+}
+
 }  // namespace lowlux::capture

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -7,6 +8,7 @@
 #include "capture/dng/dng_storage.h"
 #include "capture/dng/tiff_directory.h"
 #include "isp/base/frame.h"
+#include "isp/base/plane.h"
 #include "isp/base/result.h"
 
 namespace lowlux::capture {
@@ -24,6 +26,10 @@ Result<std::optional<std::vector<double>>> read_scale(const TiffDirectory& direc
 /// of as many values as the cell of the mosaic has sites, without BlackLevelRepeatDim, gives a warning.
 Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, RawDn& raw,
                          std::vector<std::string>& warnings);
+
+/// Replaces codes by their values in LinearizationTable, if there is one; those beyond it get its last value. Errors: a
+/// damaged table.
+Result<void> apply_linearization_table(const TiffDirectory& directory, Plane<std::uint16_t>& codes);
 
 /// Returns the regions of a readout outside its active area, as up to four rectangles that do not overlap.
 std::vector<Rect> borders(int width, int height, const Rect& active);

@@ -1,87 +1,43 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <span>
-#include <string>
-#include <vector>
 
-#include "capture/dng/tiff_directory.h"
+#include "capture/dng/dng_storage.h"
 #include "isp/base/frame.h"
 #include "isp/base/result.h"
 
 namespace lowlux::capture {
 
-/// Reads consecutive big-endian numbers. Beyond the end it returns zeros and sets a flag.
-class OpcodeReader {
- public:
-  explicit OpcodeReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
-
-  std::uint32_t u32() { return take(4) ? load_u32(bytes_.data() + at_ - 4, true) : 0; }
-  double f64() { return take(8) ? load_f64(bytes_.data() + at_ - 8, true) : 0; }
-  float f32() { return take(4) ? load_f32(bytes_.data() + at_ - 4, true) : 0; }
-  std::span<const std::byte> block(std::size_t size) {
-    return take(size) ? bytes_.subspan(at_ - size, size) : std::span<const std::byte>{};
-  }
-  std::size_t left() const { return bytes_.size() - at_; }
-  bool complete() const { return complete_; }
-
- private:
-  bool take(std::size_t size) {
-    if (size > left()) {
-      complete_ = false;
-      return false;
-    }
-    at_ += size;
-    return true;
-  }
-
-  std::span<const std::byte> bytes_;
-  std::size_t at_ = 0;
-  bool complete_ = true;
-};
-
-/// Calls `use` with the number and the parameters of each opcode of OpcodeList1 to 3. It ends with the first error:
-/// that of `use`, or of a list that is damaged or holds more than 64 opcodes.
-Result<void> each_opcode(std::span<const std::byte> bytes, int list,
-                         const std::function<Result<void>(std::uint32_t, std::span<const std::byte>)>& use);
-
-/// States what the samples went through before the opcodes are read.
-struct SampleState {
-  bool linearized = false;   // a LinearizationTable, which opcodes of list 1 precede
-  bool polynomials = false;  // MapPolynomial of list 2
-  bool is_x_trans = false;   // one for each site, of a frame that will have three planes
-};
-
-/// Reads a DNG opcode list (DNG 1.4, chapter 7) into the corrections of a frame. Precondition: the geometry, layout,
-/// phase and samples of `frame.raw` are filled.
+/// Reads a DNG opcode list (DNG 1.7, chapter 7). Lists 1 and 2 change the samples and levels of the frame; gains and
+/// defects become its corrections. Precondition: the geometry, layout, phase, levels and samples of `frame.raw` are
+/// filled, for list 1 with the codes that the file stores, for lists 2 and 3 after LinearizationTable.
 ///
-/// GainMap, ScalePerRow, ScalePerColumn (as gain maps with a point in each row or column) and FixVignetteRadial of
-/// lists 2 and 3, FixBadPixelsList and FixBadPixelsConstant are kept; every other opcode becomes a warning that names
-/// it. Gains of list 3 are meant for demosaiced data: applied to the mosaic they give the same image where nothing
-/// clips, because demosaicing is linear and gains vary slowly. Opcodes that are not applied become warnings whether the
-/// file marks them optional or not: the image without them is still useful.
+/// | opcode | list 1, on codes | list 2, on fractions of white | list 3 |
+/// |---|---|---|---|
+/// | GainMap, FixVignetteRadial, ScalePerRow, ScalePerColumn | changes codes | correction | correction |
+/// | DeltaPerRow, DeltaPerColumn | changes codes | changes the black level | not applied |
+/// | MapTable, MapPolynomial | changes codes | changes samples (change_fractions) | not applied |
+/// | FixBadPixelsList | correction | correction | correction |
+/// | FixBadPixelsConstant | correction | not applied | not applied |
+/// | TrimBounds, as the last opcode of all lists | not applied | crop | crop |
 ///
-/// The opcodes of a list build on each other, so a list is applied completely or not at all: on an error, which names
-/// the damaged value or the exceeded limit, `frame` stays as it was. A list holds up to 64 opcodes, the frame up to 64
-/// gains and 2^20 defects; pixels of all constants of a list are found in one pass. Constants of more than a sixteenth
-/// of the active pixels are not applied, with a warning.
+/// Gains of list 3 are meant for demosaiced data: applied to the mosaic they give the same image where nothing clips,
+/// because demosaicing is linear and gains vary slowly. Gains of list 2 are applied later than its deltas and maps, in
+/// whatever order they are listed: a function f that follows a gain g becomes f(g v) / g.
 ///
-/// @param list        1, 2 or 3: positions count from the readout (1) or the active area (2, 3)
-/// @param samples     which opcodes of list 1 and 2 the samples went through
-Result<void> read_opcodes(std::span<const std::byte> bytes, int list, SampleState samples, RawFrame& frame);
-
-/// Holds a MapPolynomial opcode: the sum of coefficient[i] x^i, for planes first_plane to first_plane + planes - 1.
-struct Polynomial {
-  int first_plane = 0, planes = 1;
-  std::vector<double> coefficient;
-
-  bool applies_to(int plane) const { return plane >= first_plane && plane - first_plane < planes; }
-};
-
-/// Returns the MapPolynomial opcodes of a list, in their order; other opcodes are skipped. Errors: a damaged list, or
-/// a polynomial that is damaged, has a degree above 8 or leaves out a part of the active area.
-Result<std::vector<Polynomial>> read_polynomials(std::span<const std::byte> bytes, const Rect& active);
+/// What is not applied becomes a warning, whether the file marks it optional or not, because the image without it is
+/// still useful, and RawCorrections::not_applied if a DNG of the frame is to state it again. That excludes list 1 and
+/// constants, which refer to codes that no other file has, and positions in mosaics that are interpolated or binned.
+///
+/// A list is applied completely or not at all: on an error, which names the damaged value or the exceeded limit,
+/// `frame` stays as it was. A list holds up to 64 opcodes, the frame up to 64 gains and 2^20 defects; pixels of all
+/// constants of a list are found in one pass. Constants of more than a sixteenth of the active pixels are not applied,
+/// with a warning.
+///
+/// @param list     1, 2 or 3: positions count from the readout (1) or the active area (2, 3)
+/// @param is_last  whether the file has no later list
+Result<void> read_opcodes(std::span<const std::byte> bytes, int list, bool is_last, const DngImage& image,
+                          RawFrame& frame);
 
 }  // namespace lowlux::capture

@@ -43,6 +43,11 @@ struct DngImage {
   std::optional<XTransPhase> x_trans;   // of a mosaic that is X-Trans and not Bayer, from the corner of the active area
 };
 
+/// Returns whether an image is stored in lossy JPEG or JPEG XL, of which OpcodeList2 makes linear values.
+inline bool is_encoded(const DngImage& image) {
+  return image.decoder == DngDecoder::lossy_jpeg || image.decoder == DngDecoder::jpeg_xl;
+}
+
 /// Returns whether LibRaw reads an image of this size.
 inline bool is_libraw_size(const DngImage& image) {
   return std::min(image.width, image.height) >= min_libraw_side &&

@@ -15,7 +15,6 @@
 
 #include "capture/dng/dng_colour.h"
 #include "capture/dng/dng_file.h"
-#include "capture/dng/dng_opcodes.h"
 #include "capture/dng/dng_tags.h"
 #include "capture/dng/tiff_directory.h"
 #include "isp/base/camera_profile.h"
@@ -233,38 +232,6 @@ void add_directory(const TiffFile& tiff, const TiffDirectory& main, TagName poin
                  ") are not copied: " + found.error().message);
 }
 
-/// Returns the opcodes of OpcodeList3 other than gains and defects, which are in RawFrame::corrections; empty if there
-/// are none or the list is damaged.
-std::vector<std::byte> other_opcodes(std::span<const std::byte> list) {
-  constexpr std::array<std::uint32_t, 6> read{3, 4, 5, 9, 12, 13};
-  constexpr std::size_t header = 16;
-  std::vector<std::byte> out(4);
-  std::size_t at = 4;
-  std::uint8_t kept = 0;
-  const auto good = each_opcode(list, 3, [&](std::uint32_t id, std::span<const std::byte> parameters) -> Result<void> {
-    const auto opcode = list.subspan(at, header + parameters.size());
-    at += opcode.size();
-    if (std::find(read.begin(), read.end(), id) != read.end()) return {};
-    out.insert(out.end(), opcode.begin(), opcode.end());
-    ++kept;
-    return {};
-  });
-  if (!good || kept == 0) return {};
-  out[3] = std::byte{kept};  // at most 64
-  return out;
-}
-
-void add_opcodes(const DngFile& dng, const TiffDirectory& raw_image, std::vector<SourceTag>& to) {
-  const TagName name = tag::opcode_list[2];
-  const TiffDirectory& home = raw_image.find(name) != nullptr ? raw_image : dng.main;
-  const auto list = home.bytes(name);
-  if (!list || list->empty()) return;
-  std::vector<std::byte> kept = other_opcodes(*list);
-  if (kept.empty()) return;
-  const auto count = static_cast<std::uint32_t>(kept.size());
-  to.push_back({name.id, static_cast<std::uint16_t>(TiffEntry::Type::undefined), count, std::move(kept)});
-}
-
 /// Exchanges the tables of the two calibrations if these were sorted (read_colour).
 void follow_calibrations(const DngFile& dng, std::vector<SourceTag>& tags) {
   std::array<double, 2> cct_k{};
@@ -303,7 +270,6 @@ SourceTags tags_of_dng(const TiffFile& tiff, const DngFile& dng, Collector& coll
   collector.add_some(dng_tags, dng.main, &raw_image, tags.main);
   const TiffEntry* maker = dng.main.find(tag::dng_private_data);
   if (maker != nullptr && !is_of_lowlux(maker->values)) collector.add(*maker, tags.main);
-  add_opcodes(dng, raw_image, tags.main);
   follow_calibrations(dng, tags.main);
   if (dng.exif) collector.add_all(*dng.exif, tags.exif, exif_kind);
   add_directory(tiff, dng.main, gps_ifd, gps_kind, collector, tags.gps);

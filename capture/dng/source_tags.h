@@ -13,8 +13,8 @@
 namespace lowlux::capture {
 
 /// Returns the tags of a DNG that are passed on: author, copyright, XMP, IPTC, names and serial numbers of the camera,
-/// its colour profile, sharpness and green split, the maker's data, all EXIF and GPS tags, and of OpcodeList3 what is
-/// not in RawFrame::corrections. The maker note of EXIF is passed on only if MakerNoteSafety states that it may be.
+/// its colour profile, sharpness and green split, the maker's data, and all EXIF and GPS tags. The maker note of EXIF
+/// is passed on only if MakerNoteSafety states that it may be. Opcodes are in RawFrame::corrections.
 ///
 /// Values beyond the end of the file, and those above 64 MB in all, are left out with a warning: directories may name
 /// the same bytes any number of times.

@@ -103,9 +103,13 @@ Error not_decoded(std::span<const std::byte> bytes, Error error) {
   return error;
 }
 
-/// Returns the damaged tags that make the decoder reject the file, although the samples do not need them.
-std::vector<const TiffEntry*> harmful_tags(const DngFile& dng) {
+/// Returns the tags that the decoder is not to see: LinearizationTable, which opcodes of OpcodeList1 precede, and
+/// damaged tags that make it reject the file, although the samples do not need them.
+std::vector<const TiffEntry*> hidden_tags(const DngFile& dng) {
   std::vector<const TiffEntry*> found;
+  for (const TiffDirectory& directory : dng.raw_images) {
+    if (const TiffEntry* table = directory.find(tag::linearization_table)) found.push_back(table);
+  }
   for (const auto* directories : {&dng.raw_images, &dng.previews}) {
     for (const TiffDirectory& directory : *directories) {
       if (!read_scale(directory)) found.push_back(directory.find(tag::default_scale));
@@ -115,12 +119,12 @@ std::vector<const TiffEntry*> harmful_tags(const DngFile& dng) {
   return found;
 }
 
-/// Decodes a copy of the file in which harmful tags have the number 0, which hides them.
+/// Decodes a copy of the file in which hidden tags have the number 0.
 Result<DecodedRaw> decode_dng(const DngFile& dng, std::span<const std::byte> bytes, const ReadLimits& limits) {
-  const auto harmful = harmful_tags(dng);
-  if (harmful.empty()) return decode_contained(bytes, limits);
+  const auto hidden = hidden_tags(dng);
+  if (hidden.empty()) return decode_contained(bytes, limits);
   std::vector<std::byte> changed(bytes.begin(), bytes.end());
-  for (const TiffEntry* entry : harmful) std::fill_n(changed.begin() + entry->place, 2, std::byte{0});
+  for (const TiffEntry* entry : hidden) std::fill_n(changed.begin() + entry->place, 2, std::byte{0});
   return decode_contained(changed, limits);
 }
 
@@ -150,22 +154,22 @@ Result<RawFrame> read_dng(const DngFile& dng, std::span<const std::byte> bytes, 
     case DngDecoder::lossy_jpeg: {
       auto codes = decode_lossy_image(bytes, raw_image, image);
       if (!codes) return pass_on(codes);
-      return complete_linearized_dng(dng, *std::move(described), *std::move(codes), use);
+      return complete_dng(dng, *std::move(described), *std::move(codes), use);
     }
     case DngDecoder::jpeg_xl: {
       auto codes = decode_jpeg_xl_image(bytes, raw_image, image, limits);
       if (!codes) return pass_on(codes);
-      return complete_linearized_dng(dng, *std::move(described), *std::move(codes), use);
+      return complete_dng(dng, *std::move(described), *std::move(codes), use);
     }
     case DngDecoder::rows: {
       if (image.is_float) {
         auto samples = decode_float_image(bytes, raw_image, image);
         if (!samples) return pass_on(samples);
-        return complete_float_dng(dng, *std::move(described), *std::move(samples), use);
+        return complete_dng(dng, *std::move(described), *std::move(samples), use);
       }
       auto codes = decode_code_image(bytes, raw_image, image);
       if (!codes) return pass_on(codes);
-      return complete_code_dng(dng, *std::move(described), *std::move(codes), use);
+      return complete_dng(dng, *std::move(described), *std::move(codes), use);
     }
     case DngDecoder::libraw:
       break;

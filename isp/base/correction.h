@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -21,7 +22,7 @@ struct GainMap {
   int points_v = 1, points_h = 1, map_planes = 1;
   double spacing_v = 1, spacing_h = 1;  // distance of the points, relative to the active area's height and width
   double origin_v = 0, origin_h = 0;    // position of the first point, relative likewise
-  std::vector<float> gain;              // points_v x points_h x map_planes
+  std::vector<float> gain;              // points_v x points_h x map_planes; the last plane is that of all further ones
   std::array<GainNoise, 4> noise{};     // noise of each site of a mosaic; 0 where the gains are exact
 };
 
@@ -40,11 +41,22 @@ struct DefectRect {
 /// Defect lists of more than 1 / max_named_fraction of the active pixels are rejected as implausible.
 inline constexpr std::int64_t max_named_fraction = 16;
 
+/// Holds an opcode of a DNG as the file states it.
+struct DngOpcode {
+  std::uint32_t id = 0;
+  std::uint32_t version = 0;  // of DNG, which introduced it: 0x01030000 for 1.3
+  std::uint32_t flags = 0;    // bit 0: readers may skip it; bit 1: previews may
+  std::vector<std::byte> parameters;
+
+  bool is_optional() const { return (flags & 1U) != 0; }
+};
+
 /// Holds the corrections a source asks for, each applied after black (and dark) have been subtracted.
 struct RawCorrections {
   std::vector<GainMap> gain_maps;
   std::vector<RadialGain> radial_gains;
   std::vector<DefectRect> defects;
+  std::array<std::vector<DngOpcode>, 2> not_applied;  // opcodes of OpcodeList2 and 3 for readers of a DNG of this frame
 };
 
 }  // namespace lowlux

@@ -132,6 +132,31 @@ TEST(LossyDng, ATableComesBeforeTheCurve) {
   }
 }
 
+TEST(LossyDng, ACurveMayApplyToAPartOfTheImage) {
+  DngBuilder dng = lossy_dng();
+  const RawDn codes = test::read_built(dng).raw;
+  std::vector<PolynomialOpcode> parts = curves();
+  parts[0].top = 7, parts[0].bottom = 30, parts[1].pitch = 2, parts[2].pitch = 3;
+  dng.set(51009, opcode_list(parts));
+  const RawDn curved = test::read_built(dng).raw;
+  for (int i = 0; i < static_cast<int>(codes.dn.size()); ++i) {
+    const PolynomialOpcode& part = parts[static_cast<std::size_t>(i % 3)];
+    const int x = i / 3 % width, y = i / 3 / width;
+    const auto inside = [&](int at, std::uint32_t first) {
+      return at >= static_cast<int>(first) && (at - static_cast<int>(first)) % static_cast<int>(part.pitch) == 0;
+    };
+    double value = codes.dn.data()[i] / 255.0;
+    if (inside(y, part.top) && inside(x, 0) && y < static_cast<int>(part.bottom)) {
+      double sum = 0;
+      for (std::size_t n = 0; n < part.coefficient.size(); ++n) {
+        sum += part.coefficient[n] * std::pow(value, static_cast<double>(n));
+      }
+      value = sum;
+    }
+    ASSERT_NEAR(curved.dn.data()[i], 65535 * value, 0.5 + 1e-9) << x << ", " << y;
+  }
+}
+
 TEST(LossyDng, OneSampleIsMonochrome) {
   DngBuilder dng = lossy_dng();
   dng.samples = 1;
@@ -150,11 +175,8 @@ TEST(LossyDng, WhatCannotBeDecodedIsRefusedWithTheReason) {
     DngBuilder dng = lossy_dng();
     return refused(dng.set(51009, opcode_list(opcodes)));
   };
-  EXPECT_TRUE(has(with({{.top = 1, .coefficient = {0, 1}}}), "a part of the image"));
-  EXPECT_TRUE(has(with({{.pitch = 2, .coefficient = {0, 1}}}), "a part of the image"));
   EXPECT_TRUE(has(with({{.coefficient = {1, -1}}}), "fall"));
   EXPECT_TRUE(has(with({{.coefficient = {0, std::nan("")}}}), "damaged"));
-  EXPECT_TRUE(has(with({{.plane = 7, .coefficient = {0, 1}}}), "damaged"));
   EXPECT_TRUE(has(with({{.coefficient = std::vector<double>(10, 0.1)}}), "damaged"));
   DngBuilder cut = lossy_dng();
   cut.stored_parts[3].resize(cut.stored_parts[3].size() / 2);

@@ -10,6 +10,7 @@
 #include "tests/capture/read_built.h"
 #include "tests/capture/x_trans_colours.h"
 #include "tests/support/dng/float_dng.h"
+#include "tests/support/dng/opcode_list.h"
 
 namespace lowlux::capture {
 namespace {
@@ -149,22 +150,13 @@ TEST(XTransFrame, SaturatedSitesStayAtWhite) {
   }
 }
 
-/// An opcode list of one opcode (DNG 1.4, chapter 7).
-Tag opcodes(std::uint32_t id, const std::vector<std::byte>& parameters) {
-  std::vector<std::byte> out;
-  for (const std::uint32_t word : {1U, id, 0x01030000U, 1U, static_cast<std::uint32_t>(parameters.size())})
-    test::append_u32(out, word);
-  out.insert(out.end(), parameters.begin(), parameters.end());
-  return Tag::opaque(out);
-}
-
 TEST(XTransFrame, DefectsThatTheFileNamesAreRepaired) {
   DngBuilder dng = x_trans_dng({0, 5});
   dng.pixels[10 * dng.width + 12] = 300;
   dng.pixels[11 * dng.width + 12] = 9;
   std::vector<std::byte> list;
   for (const std::uint32_t word : {0U, 2U, 0U, 10U, 12U, 11U, 12U}) test::append_u32(list, word);
-  dng.set(51008, opcodes(5, list));
+  dng.set(51008, test::opcode_list({{.id = 5, .parameters = list}}));
   const RawFrame frame = test::read_built(dng);
   expect_colours(frame);
   EXPECT_TRUE(frame.corrections.defects.empty());
@@ -173,7 +165,7 @@ TEST(XTransFrame, DefectsThatTheFileNamesAreRepaired) {
   constant.pixels[10 * constant.width + 12] = 4;
   std::vector<std::byte> value;
   for (const std::uint32_t word : {4U, 0U}) test::append_u32(value, word);
-  constant.set(51008, opcodes(4, value));
+  constant.set(51008, test::opcode_list({{.id = 4, .parameters = value}}));
   expect_colours(test::read_built(constant));
 }
 
@@ -185,7 +177,7 @@ TEST(XTransFrame, GainMapsOfTheMosaicAreForAllPlanes) {
     test::append_u32(map, 1);
     test::append_f32(map, 1.5F);
     DngBuilder dng = x_trans_dng({4, 4});
-    dng.set(51009, opcodes(9, map));
+    dng.set(51009, test::opcode_list({{.id = 9, .parameters = map}}));
     return test::read_built(dng);
   };
   const RawFrame all = with_pitch(1);

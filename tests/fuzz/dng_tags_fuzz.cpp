@@ -40,14 +40,14 @@ LOWLUX_FUZZ_TARGET(dng_tags)(const std::uint8_t* data, std::size_t size) {
     if (image.is_float) {
       auto samples = lowlux::capture::decode_float_image(bytes, raw_image, image);
       if (!samples) continue;
-      const auto frame = lowlux::capture::complete_float_dng(**dng, *std::move(described), *std::move(samples));
+      const auto frame = lowlux::capture::complete_dng(**dng, *std::move(described), *std::move(samples));
       if (frame) lowlux::test::check(*frame);
       continue;
     }
     if (image.decoder == lowlux::capture::DngDecoder::rows) {
       auto codes = lowlux::capture::decode_code_image(bytes, raw_image, image);
       if (!codes) continue;
-      const auto frame = lowlux::capture::complete_code_dng(**dng, *std::move(described), *std::move(codes));
+      const auto frame = lowlux::capture::complete_dng(**dng, *std::move(described), *std::move(codes));
       if (frame) lowlux::test::check(*frame);
       continue;
     }

@@ -2,31 +2,27 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "tests/support/dng/code_dng.h"
 #include "tests/support/dng/dng_builder.h"
+#include "tests/support/dng/drawn_opcodes.h"
 #include "tests/support/dng/float_dng.h"
 
 namespace lowlux::test {
 namespace {
 
-std::vector<std::byte> opcodes() {
-  std::vector<std::byte> out;
-  const auto words = [&out](const std::vector<std::uint32_t>& values) {
-    for (const std::uint32_t value : values) append_u32(out, value);
-  };
-  words({4});
-  words({9, 0x01030000, 0, 76 + 4 * 4, 0, 0, 24, 24, 0, 1, 2, 2, 2, 2});  // GainMap of 2 x 2 points
-  for (const double value : {1.0, 1.0, 0.0, 0.0}) append_f64(out, value);
-  words({1});
-  for (int i = 0; i < 4; ++i) append_f32(out, 1.0F + 0.1F * static_cast<float>(i));
-  words({3, 0x01030000, 0, 56});  // FixVignetteRadial
-  for (const double value : {0.1, 0.0, 0.0, 0.0, 0.0, 0.5, 0.5}) append_f64(out, value);
-  words({5, 0x01030000, 0, 36, 0, 1, 1, 3, 4, 5, 6, 7, 8});  // FixBadPixelsList
-  words({4, 0x01030000, 0, 8, 0, 0});                        // FixBadPixelsConstant
-  return out;
+Tag opcodes() {
+  std::mt19937 draw(1);
+  std::vector<Opcode> out{words(5, {0, 1, 1, 3, 4, 5, 6, 7, 8}), words(4, {0, 0})};  // defects
+  for (const std::uint32_t id : {3U, 8U, 9U, 10U, 11U, 12U, 13U}) {
+    out.push_back(draw_opcode(id, {.width = 28, .height = 25}, draw).encoded);
+  }
+  out.push_back(words(7, {0, 0, 24, 24, 0, 1, 1, 1, 2, 0x00008000}));  // MapTable of two entries
+  out.push_back(words(6, {1, 2, 20, 24}));                             // TrimBounds
+  return opcode_list(out);
 }
 
 DngBuilder plain(int bits) {
@@ -54,7 +50,7 @@ DngBuilder everything() {
   dng.set(50779, Tag::numbers(TagType::u16, {17}));
   dng.set(50964, Tag::numbers(TagType::srational, {0.6, 0.2, 0.16, 0.25, 0.7, 0.05, 0.01, 0.1, 0.71}));
   dng.set(51041, Tag::numbers(TagType::f64, {1e-4, 1e-7}));
-  for (const std::uint16_t list : {51008, 51009, 51022}) dng.set(list, Tag::opaque(opcodes()));
+  for (const std::uint16_t list : {51008, 51009, 51022}) dng.set(list, opcodes());
   dng.set(33434, Tag::rationals(TagType::rational, {{1, 30}}));
   dng.set(34855, Tag::numbers(TagType::u16, {3200}));
   dng.set(36867, Tag::text("2024:12:24 23:59:01"));

@@ -19,8 +19,8 @@ constexpr std::array<std::uint32_t, 2> color_matrix{TIFFTAG_COLORMATRIX1, TIFFTA
 constexpr std::array<std::uint32_t, 2> camera_calibration{TIFFTAG_CAMERACALIBRATION1, TIFFTAG_CAMERACALIBRATION2};
 constexpr std::array<std::uint32_t, 2> illuminant{TIFFTAG_CALIBRATIONILLUMINANT1, TIFFTAG_CALIBRATIONILLUMINANT2};
 constexpr std::array<std::uint32_t, 2> forward_matrix{50964, 50965};
-constexpr std::uint32_t opcode_list1 = 51008, opcode_list2 = 51009, noise_profile = 51041,
-                        noise_reduction_applied = 50935;
+constexpr std::array<std::uint32_t, 3> opcode_list{51008, 51009, 51022};
+constexpr std::uint32_t noise_profile = 51041, noise_reduction_applied = 50935;
 
 /// Converts the values of rationals to float, as libtiff requires.
 template <class Numbers>
@@ -61,23 +61,20 @@ std::array<std::uint32_t, 4> edges_of(const Rect& r) {
           static_cast<std::uint32_t>(r.x + r.width)};
 }
 
-void set_opcodes(TIFF* tiff, std::uint32_t tag, const std::vector<std::byte>& list) {
-  if (!list.empty()) TIFFSetField(tiff, tag, static_cast<std::uint32_t>(list.size()), list.data());
-}
-
 }  // namespace
 
 void declare_dng_tags(TIFF* file) {
-  static char names[][24] = {"ForwardMatrix1", "ForwardMatrix2", "OpcodeList1",
-                             "OpcodeList2",    "NoiseProfile",   "NoiseReductionApplied"};
+  static char names[][24] = {"ForwardMatrix1", "ForwardMatrix2", "OpcodeList1",          "OpcodeList2",
+                             "OpcodeList3",    "NoiseProfile",   "NoiseReductionApplied"};
   constexpr short any = TIFF_VARIABLE, any32 = TIFF_VARIABLE2;
   static const TIFFFieldInfo fields[] = {
       {50964, any, any, TIFF_SRATIONAL, FIELD_CUSTOM, 1, 1, names[0]},
       {50965, any, any, TIFF_SRATIONAL, FIELD_CUSTOM, 1, 1, names[1]},
-      {opcode_list1, any32, any32, TIFF_UNDEFINED, FIELD_CUSTOM, 1, 1, names[2]},
-      {opcode_list2, any32, any32, TIFF_UNDEFINED, FIELD_CUSTOM, 1, 1, names[3]},
-      {noise_profile, any, any, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, names[4]},
-      {noise_reduction_applied, any, any, TIFF_RATIONAL, FIELD_CUSTOM, 1, 1, names[5]},
+      {opcode_list[0], any32, any32, TIFF_UNDEFINED, FIELD_CUSTOM, 1, 1, names[2]},
+      {opcode_list[1], any32, any32, TIFF_UNDEFINED, FIELD_CUSTOM, 1, 1, names[3]},
+      {opcode_list[2], any32, any32, TIFF_UNDEFINED, FIELD_CUSTOM, 1, 1, names[4]},
+      {noise_profile, any, any, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, names[5]},
+      {noise_reduction_applied, any, any, TIFF_RATIONAL, FIELD_CUSTOM, 1, 1, names[6]},
   };
   TIFFMergeFieldInfo(file, fields, std::size(fields));
 }
@@ -133,8 +130,10 @@ void set_dng_noise_and_opcodes(TIFF* file, const RawFrame& frame) {
     TIFFSetField(file, TIFFTAG_DNGPRIVATEDATA, static_cast<int>(bytes.size()), bytes.data());
   }
   const OpcodeLists lists = opcode_lists(frame);
-  set_opcodes(file, opcode_list1, lists.first);
-  set_opcodes(file, opcode_list2, lists.second);
+  for (std::size_t i = 0; i < lists.size(); ++i) {
+    if (lists[i].empty()) continue;
+    TIFFSetField(file, opcode_list[i], static_cast<std::uint32_t>(lists[i].size()), lists[i].data());
+  }
 }
 
 std::uint16_t light_source_of(double cct_k) {
@@ -170,7 +169,7 @@ class Numbers {
   void word(std::uint32_t number) { put(number, 4); }
   void number(double number) { put(std::bit_cast<std::uint64_t>(number), 8); }
   void number(float number) { put(std::bit_cast<std::uint32_t>(number), 4); }
-  void append(const Numbers& more) { bytes_.insert(bytes_.end(), more.bytes_.begin(), more.bytes_.end()); }
+  void append(const std::vector<std::byte>& more) { bytes_.insert(bytes_.end(), more.begin(), more.end()); }
   const std::vector<std::byte>& bytes() const { return bytes_; }
 
  private:
@@ -183,16 +182,19 @@ class Numbers {
 class List {
  public:
   void add(std::uint32_t id, const Numbers& parameters) {
-    for (const std::uint32_t word : {id, since_version, 0U}) opcodes_.word(word);  // flags 0: must not be skipped
-    opcodes_.word(static_cast<std::uint32_t>(parameters.bytes().size()));
-    opcodes_.append(parameters);
+    add({.id = id, .version = since_version, .parameters = parameters.bytes()});  // flags 0: must not be skipped
+  }
+  void add(const DngOpcode& opcode) {
+    for (const std::uint32_t word : {opcode.id, opcode.version, opcode.flags}) opcodes_.word(word);
+    opcodes_.word(static_cast<std::uint32_t>(opcode.parameters.size()));
+    opcodes_.append(opcode.parameters);
     ++count_;
   }
   std::vector<std::byte> bytes() const {
     if (count_ == 0) return {};
     Numbers all;
     all.word(count_);
-    all.append(opcodes_);
+    all.append(opcodes_.bytes());
     return all.bytes();
   }
 
@@ -238,12 +240,25 @@ Numbers parameters_of(const std::vector<DefectRect>& defects, const RawDn& raw) 
 }  // namespace
 
 OpcodeLists opcode_lists(const RawFrame& frame) {
-  List first, second;
+  List first, second, third;
   const RawCorrections& c = frame.corrections;
   if (!c.defects.empty()) first.add(fix_bad_pixels_list, parameters_of(c.defects, frame.raw));
   for (const GainMap& map : c.gain_maps) second.add(gain_map, parameters_of(map));
   for (const RadialGain& radial : c.radial_gains) second.add(fix_vignette_radial, parameters_of(radial));
-  return {first.bytes(), second.bytes()};
+  for (const DngOpcode& opcode : c.not_applied[0]) second.add(opcode);
+  for (const DngOpcode& opcode : c.not_applied[1]) third.add(opcode);
+  return {first.bytes(), second.bytes(), third.bytes()};
+}
+
+std::uint32_t opcodes_version(const RawCorrections& corrections) {
+  const bool any = !corrections.gain_maps.empty() || !corrections.radial_gains.empty() || !corrections.defects.empty();
+  std::uint32_t version = any ? since_version : 0;
+  for (const auto& list : corrections.not_applied) {
+    for (const DngOpcode& opcode : list) {
+      if (!opcode.is_optional()) version = std::max(version, opcode.version);
+    }
+  }
+  return version;
 }
 
 }  // namespace lowlux::isp

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -23,14 +24,16 @@ void set_dng_colour(tiff* file, const CameraColour& colour);
 /// Sets NoiseProfile, the noise ratio (noise_ratio_bytes.h) and the opcode lists. Precondition: check_dng_frame.
 void set_dng_noise_and_opcodes(tiff* file, const RawFrame& frame);
 
-/// Holds the corrections of a frame as the opcode lists of DNG 1.4 (chapter 7); empty where there is nothing to
-/// correct.
-struct OpcodeLists {
-  std::vector<std::byte> first;   // OpcodeList1, on the readout: FixBadPixelsList
-  std::vector<std::byte> second;  // OpcodeList2, on values without black: GainMap, FixVignetteRadial
-};
+/// Holds the corrections of a frame as the opcode lists of DNG 1.7 (chapter 7), OpcodeList1 to 3: FixBadPixelsList, on
+/// the readout; GainMap and FixVignetteRadial, on values without black; and what the reader of the frame did not apply.
+/// Lists without opcodes are empty.
+using OpcodeLists = std::array<std::vector<std::byte>, 3>;
 
 OpcodeLists opcode_lists(const RawFrame& frame);
+
+/// Returns the version of DNG that readers must know for the opcodes that they may not skip: 0x01030000 for 1.3; 0 if
+/// there are none.
+std::uint32_t opcodes_version(const RawCorrections& corrections);
 
 /// Returns the LightSource of EXIF 2.32 whose colour temperature is nearest in 1/T, as camera matrices are
 /// interpolated; the candidates are the CIE illuminants A, B, C, D50, D55, D65, D75 and F2, the ISO studio tungsten

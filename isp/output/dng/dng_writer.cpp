@@ -24,7 +24,6 @@ namespace {
 
 constexpr std::size_t longest_description = 4000;
 constexpr double max_baseline_exposure_ev = 100;
-constexpr std::uint16_t opcode_list3 = 51022;
 constexpr int photometric_linear_raw = 34892;  // DNG LinearRaw
 constexpr int max_tile_side = 512;             // px
 
@@ -87,11 +86,6 @@ double baseline_exposure_ev(const RawFrame& frame, const DngWriteOptions& option
   return options.baseline_exposure_ev + (frame.source_tags ? frame.source_tags->baseline_exposure_ev : 0);
 }
 
-/// Returns whether the tags of the source hold opcodes.
-bool has_opcodes(const RawFrame& frame) {
-  return frame.source_tags && find_tag(frame.source_tags->main, opcode_list3) != nullptr;
-}
-
 /// Returns whether a tag belongs to the source's camera profile, which refers to its colour matrices. That of a
 /// monochrome frame, which has none, stays.
 bool is_of_profile(const SourceTag& tag) {
@@ -128,15 +122,19 @@ std::string image_description(const RawFrame& frame, const DngWriteOptions& opti
   return is_there || !fits ? std::string() : caption + "; " + processing;
 }
 
+/// Returns the bytes of a version of DNG: 1, 4, 0, 0 of 0x01040000.
+std::array<std::uint8_t, 4> version_bytes(std::uint32_t version) {
+  std::array<std::uint8_t, 4> bytes{};
+  for (std::size_t i = 0; i < 4; ++i) bytes[i] = static_cast<std::uint8_t>(version >> (24 - 8 * i) & 255);
+  return bytes;
+}
+
 void set_identity(TIFF* tiff, const RawFrame& frame, const FrameInfo& info, const DngWriteOptions& options) {
-  constexpr std::array<std::uint8_t, 4> version{1, 4, 0, 0};
-  // MaskedAreas came with 1.1; opcodes came with 1.3 and must not be skipped; floating-point samples came with 1.4.
-  const RawCorrections& c = frame.corrections;
-  const bool opcodes = !c.gain_maps.empty() || !c.radial_gains.empty() || !c.defects.empty() || has_opcodes(frame);
-  const int needed = frame.raw.is_float() ? 4 : opcodes ? 3 : 1;
-  const std::array<std::uint8_t, 4> backward{1, static_cast<std::uint8_t>(needed), 0, 0};
-  TIFFSetField(tiff, TIFFTAG_DNGVERSION, version.data());
-  TIFFSetField(tiff, TIFFTAG_DNGBACKWARDVERSION, backward.data());
+  // MaskedAreas came with 1.1; floating-point samples came with 1.4.
+  const std::uint32_t needed =
+      std::max({0x01010000U, frame.raw.is_float() ? 0x01040000U : 0U, opcodes_version(frame.corrections)});
+  TIFFSetField(tiff, TIFFTAG_DNGVERSION, version_bytes(std::max(0x01040000U, needed)).data());
+  TIFFSetField(tiff, TIFFTAG_DNGBACKWARDVERSION, version_bytes(needed).data());
   TIFFSetField(tiff, TIFFTAG_UNIQUECAMERAMODEL, unique_camera_model(info).c_str());
   set_tiff_info(tiff, info);
   // Blank tags mean unknown (EXIF 2.32, 4.6.5.4); RawSpeed, and with it darktable, requires them to be present.

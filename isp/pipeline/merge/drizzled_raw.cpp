@@ -106,14 +106,6 @@ Rect scaled_crop(const Rect& crop, double scale, const RawDn& image) {
           std::min(scaled(crop.height), image.active.height - y)};
 }
 
-/// Returns the tags without OpcodeList3, whose operations are for the pixels of a frame, not for those of a drizzled
-/// image.
-std::shared_ptr<const SourceTags> without_opcodes(SourceTags tags) {
-  constexpr std::uint16_t opcode_list_3 = 51022;
-  std::erase_if(tags.main, [](const SourceTag& tag) { return tag.id == opcode_list_3; });
-  return std::make_shared<const SourceTags>(std::move(tags));
-}
-
 }  // namespace
 
 Result<void> check_drizzle_memory(int width, int height, const merge::DrizzleOptions& options, double limit_bytes) {
@@ -154,7 +146,8 @@ void encode_drizzled(merge::DrizzleImage& image, const merge::DrizzleOptions& op
   out.frame.colour = std::move(frame.colour);
   out.frame.corrections = std::move(frame.corrections);
   out.frame.corrections.defects.clear();
-  if (frame.source_tags) out.frame.source_tags = without_opcodes(*frame.source_tags);
+  out.frame.corrections.not_applied = {};  // they are for the pixels of a frame, not for those of a drizzled image
+  out.frame.source_tags = std::move(frame.source_tags);
   smooth_gain_maps(out.frame.corrections, frame.raw.active.height, executor);
   out.frame.corrections.gain_maps =
       maps_of_planes(std::move(out.frame.corrections.gain_maps), frame.raw, out.frame.raw);
