@@ -115,25 +115,30 @@ void bin_samples(RawDn& raw, const Axis& x, const Axis& y) {
   }
 }
 
-/// @param x, y  of the active area
-void bin_corrections(const Axis& x, const Axis& y, RawFrame& frame) {
+/// Changes the position of a map's points, which is relative to `sites` before and to `blocks` after.
+void bin_points(double& origin, double& spacing, const Axis& axis, int sites, int blocks) {
+  const double scale = sites / (2.0 * blocks);
+  origin = (origin - static_cast<double>(axis.first) / sites) * scale;
+  spacing *= scale;
+}
+
+/// @param x, y    of the active area
+/// @param sites   the active area before
+void bin_corrections(const Axis& x, const Axis& y, const Rect& sites, RawFrame& frame) {
+  const Rect& active = frame.raw.active;
   std::vector<DefectRect>& defects = frame.corrections.defects;
   for (DefectRect& defect : defects) {
     const int left = std::max(x.block_of(defect.x), 0), top = std::max(y.block_of(defect.y), 0);
-    const int right = std::min(x.block_of(defect.x + defect.width - 1), frame.raw.active.width - 1);
-    const int bottom = std::min(y.block_of(defect.y + defect.height - 1), frame.raw.active.height - 1);
+    const int right = std::min(x.block_of(defect.x + defect.width - 1), active.width - 1);
+    const int bottom = std::min(y.block_of(defect.y + defect.height - 1), active.height - 1);
     defect = {left, top, right - left + 1, bottom - top + 1};
   }
   std::erase_if(defects, [](const DefectRect& defect) { return defect.width <= 0 || defect.height <= 0; });
-  std::vector<GainMap>& maps = frame.corrections.gain_maps;
-  const std::size_t before = maps.size();
-  std::erase_if(maps, [](const GainMap& map) { return map.row_pitch != 1 || map.column_pitch != 1; });
-  if (maps.size() < before) {
-    frame.warnings.emplace_back("GainMap is not applied: it skips sites of a Quad Bayer mosaic, which is binned");
-  }
-  for (GainMap& map : maps) {
+  for (GainMap& map : frame.corrections.gain_maps) {
     map.left = x.block_from(map.left), map.right = x.block_from(map.right);
     map.top = y.block_from(map.top), map.bottom = y.block_from(map.bottom);
+    bin_points(map.origin_h, map.spacing_h, x, sites.width, active.width);
+    bin_points(map.origin_v, map.spacing_v, y, sites.height, active.height);
   }
 }
 
@@ -177,7 +182,7 @@ Result<void> bin_quad_bayer(const QuadBayer& mosaic, RawFrame& frame) {
     frame.noise->offset[c] /= 4;
   }
   frame.noise_ratio = nullptr;
-  bin_corrections(active_x, active_y, frame);
+  bin_corrections(active_x, active_y, active, frame);
   frame.warnings.emplace_back(
       "Quad Bayer mosaic: the four sites of one colour are read as one, at half the width and height");
   return {};

@@ -23,8 +23,8 @@ std::optional<QuadBayer> quad_bayer_of(std::span<const double> pattern);
 /// the four sites of its block, black and white levels are four times those of a site, and the variance of the
 /// NoiseProfile, of values 0..1, is a fourth. Codes stay codes where four times the white level fits in 16 bits, and
 /// become floating-point samples otherwise. A block with a saturated site is saturated. Incomplete blocks at borders
-/// are left out. Areas keep the blocks that are completely within them, named defects those that they touch. Gain maps
-/// of single rows or columns are not applied, with a warning.
+/// are left out. Areas keep the blocks that are completely within them, named defects those that they touch. Gain maps,
+/// which multiply all rows and columns of their area, keep their place in the scene.
 /// Errors: an active area without a complete block (unsupported).
 Result<void> bin_quad_bayer(const QuadBayer& mosaic, RawFrame& frame);
 

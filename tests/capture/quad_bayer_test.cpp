@@ -10,8 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "isp/base/gain_at.h"
 #include "tests/capture/read_built.h"
 #include "tests/support/dng/dng_builder.h"
+#include "tests/support/dng/opcode_list.h"
 
 namespace lowlux::capture {
 namespace {
@@ -147,7 +149,7 @@ TEST(QuadBayer, AreasKeepCompleteBlocksAndDefectsThoseTheyTouch) {
   frame.raw.masked = {{0, 0, 7, 30}, {7, 0, 1, 30}};
   frame.raw.white_dn = {1000, 1000, 1000};
   frame.corrections.defects = {{5, 4, 2, 1}, {31, 29, 1, 1}};
-  frame.corrections.gain_maps = {{.top = 0, .left = 1, .bottom = 30, .right = 32}, {.row_pitch = 2}};
+  frame.corrections.gain_maps = {{.top = 0, .left = 1, .bottom = 30, .right = 32}};
   ASSERT_TRUE(bin_quad_bayer({}, frame));
   EXPECT_EQ(frame.raw.active, (Rect{4, 0, 16, 15}));
   EXPECT_EQ(frame.raw.default_crop, (Rect{2, 1, 9, 10}));
@@ -161,7 +163,48 @@ TEST(QuadBayer, AreasKeepCompleteBlocksAndDefectsThoseTheyTouch) {
   ASSERT_EQ(frame.corrections.gain_maps.size(), 1U);
   EXPECT_EQ(frame.corrections.gain_maps[0].left, 1);
   EXPECT_EQ(frame.corrections.gain_maps[0].right, 16);
-  EXPECT_EQ(frame.warnings.size(), 2U);
+  EXPECT_EQ(frame.warnings.size(), 1U);
+}
+
+TEST(QuadBayer, ScalesOfRowsAndColumnsAreTheMeansOfThoseOfABlock) {
+  std::mt19937 draw(31);
+  for (int i = 0; i < 32; ++i) {
+    const int left = i % 2, top = i / 2 % 2;
+    DngBuilder dng = quad_dng(BayerPhase::rggb, left, top, draw);
+    const bool of_rows = i / 4 % 2 == 0;
+    const int lines = of_rows ? dng.height : dng.width, skipped = of_rows ? top : left;
+    const int pitch = 1 + i / 8 % 2;
+    test::Opcode scale =
+        test::words(of_rows ? 12 : 13,
+                    {0, 0, static_cast<std::uint32_t>(dng.height), static_cast<std::uint32_t>(dng.width), 0, 1,
+                     static_cast<std::uint32_t>(of_rows ? pitch : 1), static_cast<std::uint32_t>(of_rows ? 1 : pitch),
+                     static_cast<std::uint32_t>((lines + pitch - 1) / pitch)});
+    std::vector<float> gains;
+    for (int line = 0; line < lines; ++line) gains.push_back(0.5F + static_cast<float>(draw() % 1000) / 1000);
+    for (int line = 0; line < (lines + pitch - 1) / pitch; ++line) {
+      test::append_f32(scale.parameters, gains[static_cast<std::size_t>(line)]);
+    }
+    dng.set(test::opcode_list2, test::opcode_list({scale}));
+    const RawFrame frame = test::read_built(dng);
+    if (pitch > 1) {
+      EXPECT_TRUE(frame.corrections.gain_maps.empty());
+      ASSERT_EQ(frame.warnings.size(), 2U);
+      EXPECT_EQ(frame.warnings[0], std::string(of_rows ? "ScalePerRow" : "ScalePerColumn") +
+                                       " (OpcodeList2) is not applied: it skips sites of a Quad Bayer mosaic, which is "
+                                       "binned");
+      continue;
+    }
+    ASSERT_EQ(frame.corrections.gain_maps.size(), 1U);
+    const GainMap& map = frame.corrections.gain_maps[0];
+    const int blocks = of_rows ? frame.raw.active.height : frame.raw.active.width;
+    for (int block = 0; block < blocks; ++block) {
+      const GridPosition at = of_rows ? row_position(map, block, blocks) : column_position(map, block, blocks);
+      const GridPosition other{0, 0, 0};
+      const float gain = of_rows ? gain_at(map, at, other, 0) : gain_at(map, other, at, 0);
+      const std::size_t first = static_cast<std::size_t>(skipped + 2 * block);
+      ASSERT_NEAR(gain, (gains[first] + gains[first + 1]) / 2, 1e-5) << "file " << i << ", block " << block;
+    }
+  }
 }
 
 TEST(QuadBayer, OtherPatternsAndAreasWithoutABlockAreRefused) {
