@@ -13,7 +13,7 @@
 #include "isp/base/gain_at.h"
 #include "tests/capture/read_built.h"
 #include "tests/support/dng/dng_builder.h"
-#include "tests/support/dng/opcode_list.h"
+#include "tests/support/dng/drawn_opcodes.h"
 
 namespace lowlux::capture {
 namespace {
@@ -203,6 +203,42 @@ TEST(QuadBayer, ScalesOfRowsAndColumnsAreTheMeansOfThoseOfABlock) {
       const float gain = of_rows ? gain_at(map, at, other, 0) : gain_at(map, other, at, 0);
       const std::size_t first = static_cast<std::size_t>(skipped + 2 * block);
       ASSERT_NEAR(gain, (gains[first] + gains[first + 1]) / 2, 1e-5) << "file " << i << ", block " << block;
+    }
+  }
+}
+
+TEST(QuadBayer, DeltasAndMapsAreAppliedToSites) {
+  for (unsigned seed = 0; seed < 32; ++seed) {
+    std::mt19937 draw(seed);
+    const int left = static_cast<int>(draw() % 2), top = static_cast<int>(draw() % 2);
+    DngBuilder dng = quad_dng(BayerPhase::rggb, left, top, draw);
+    std::vector<test::DrawnOpcode> opcodes;
+    std::vector<test::Opcode> encoded;
+    for (unsigned i = 1 + draw() % 3; i > 0; --i) {
+      const std::uint32_t id = seed % 2 == 0 ? 10 + draw() % 2 : 7 + 3 * (draw() % 2);
+      opcodes.push_back(test::draw_opcode(id, {.list = 2, .width = dng.width, .height = dng.height}, draw));
+      encoded.push_back(opcodes.back().encoded);
+    }
+    dng.set(test::opcode_list2, test::opcode_list(encoded));
+    const RawFrame frame = test::read_built(dng);
+    const bool maps = std::ranges::any_of(opcodes, &test::DrawnOpcode::is_map);
+    const double site_range = maps ? (frame.raw.white_dn[0] - frame.raw.black_tag->at(0, 0)) / 4 : 4095 - 64;
+    for (int y = 0; y < frame.raw.active.height; ++y) {
+      for (int x = 0; x < frame.raw.active.width; ++x) {
+        double sum = 0;
+        for (int site = 0; site < 4; ++site) {
+          const int column = left + 2 * x + site % 2, row = top + 2 * y + site / 2;
+          double value = (dng.pixels[static_cast<std::size_t>(row) * dng.width + column] - 64.0) / (4095 - 64);
+          for (const test::DrawnOpcode& opcode : opcodes) value = opcode.truth(value, column, row, 0);
+          sum += value;
+        }
+        const int at = frame.raw.active.x + x, line = frame.raw.active.y + y;
+        const double dn =
+            frame.raw.is_float() ? static_cast<double>(frame.raw.dn_float.at(at, line)) : frame.raw.dn.at(at, line);
+        // Four codes of 16 bits are rounded after maps.
+        ASSERT_NEAR((dn - frame.raw.black_tag->at(x, y)) / site_range, sum, (maps ? 4 * 0.5 / site_range : 0) + 1e-6)
+            << "seed " << seed << ": " << x << ", " << y;
+      }
     }
   }
 }

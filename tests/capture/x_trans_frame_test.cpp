@@ -169,6 +169,43 @@ TEST(XTransFrame, DefectsThatTheFileNamesAreRepaired) {
   expect_colours(test::read_built(constant));
 }
 
+TEST(XTransFrame, DeltasAndMapsOfTheMosaicAreAppliedBeforeItIsInterpolated) {
+  constexpr double range_dn = 65535 - 64;
+  std::mt19937 draw(11);
+  for (int i = 0; i < 12; ++i) {
+    DngBuilder dng = x_trans_dng({i % 6, i / 2});
+    const int list = 1 + i % 2, left = static_cast<int>(draw() % 6), pitch = 1 + static_cast<int>(draw() % 3);
+    const bool has_map = list == 2 && i % 4 == 3;
+    if (has_map) {
+      for (std::uint16_t& pixel : dng.pixels) pixel = static_cast<std::uint16_t>(64 + 2 * (pixel - 64));
+    }
+    test::Opcode deltas =
+        test::words(10, {0, static_cast<std::uint32_t>(left), 38, 44, 0, 1, 1, static_cast<std::uint32_t>(pitch), 38});
+    for (int y = 0; y < 38; ++y) {
+      const int delta = static_cast<int>(draw() % 60) - 30;
+      test::append_f32(deltas.parameters, static_cast<float>(list == 1 ? delta : delta / range_dn));
+      for (int x = left; x < 44; x += pitch) {
+        std::uint16_t& pixel = dng.pixels[static_cast<std::size_t>(y) * 44 + static_cast<std::size_t>(x)];
+        pixel = static_cast<std::uint16_t>(pixel - delta);
+      }
+    }
+    test::Opcode half = test::words(8, {0, 0, 38, 44, 0, 1, 1, 1, 1});
+    for (const double k : {0.0, 0.5}) test::append_f64(half.parameters, k);
+    dng.set(list == 1 ? test::opcode_list1 : test::opcode_list2,
+            has_map ? test::opcode_list({deltas, half}) : test::opcode_list({deltas}));
+    const RawFrame frame = test::read_built(dng);
+    EXPECT_TRUE(frame.warnings.empty());
+    for (int at = 0; at < static_cast<int>(frame.raw.dn_float.size()); ++at) {
+      const double black_dn = frame.raw.black_tag->at(0, 0, at % 3);
+      const double scale = has_map ? range_dn / (frame.raw.white_dn[0] - black_dn) : 1;
+      const double dn = (static_cast<double>(frame.raw.dn_float.data()[at]) - black_dn) * scale;
+      // 1e-5 of the largest code, deltas as floats, and half a code of those after maps.
+      ASSERT_NEAR(dn, code[static_cast<std::size_t>(at % 3)], has_map ? 0.6 : 0.06)
+          << "file " << i << ", sample " << at;
+    }
+  }
+}
+
 TEST(XTransFrame, GainMapsOfTheMosaicAreForAllPlanes) {
   const auto with_pitch = [](std::uint32_t pitch) {
     std::vector<std::byte> map;
