@@ -181,12 +181,12 @@ std::string row_of(const Format& format) {
 
 std::string page() {
   std::string out =
-      "# Formats\n\nEach row is a file that `tests/capture/format_table_test.cpp` builds or has, and what reading it "
-      "gives: the layout\nof the samples, or the message of the refusal. LibRaw decodes raws other than DNG, of which "
-      "no camera's file of a free\nlicence is small enough to be kept here; its list of cameras applies, without "
-      "Foveon, rotated and four-colour mosaics\nand sRAW. `tests/capture/lossy_dng_test.cpp` has lossy "
-      "LinearRaw, which is decoded. `lowlux denoise` writes\na DNG of the same layout: mosaic, monochrome, or three "
-      "colours as LinearRaw.\n\n| format | result | layout or reason |\n|---|---|---|\n";
+      "# Formats\n\nEach row is a file of `tests/capture/format_table_test.cpp`, with the result of reading it: the "
+      "layout of the samples, or\nthe error message. `lowlux denoise` writes a DNG of the same layout: mosaic, "
+      "monochrome, or three colours as LinearRaw.\nRaw formats other than DNG are decoded by LibRaw, so its list of "
+      "cameras applies, except for Foveon, rotated and\nfour-colour mosaics and sRAW; no such file with a free licence "
+      "is small enough for this test. Lossy LinearRaw is decoded\ntoo, and tested by "
+      "`tests/capture/lossy_dng_test.cpp`.\n\n| format | result | layout or reason |\n|---|---|---|\n";
   for (const auto& formats : {stored_formats(), other_formats()}) {
     for (const Format& format : formats) out += row_of(format);
   }

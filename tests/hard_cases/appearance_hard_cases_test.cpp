@@ -248,7 +248,7 @@ TEST(HardCaseMesopic, EntropyOfNoisyPixels) {
 
 TEST(HardCaseMesopic, EveryModelKeepsFiniteColoursFinite) {
   HardCase row({appearance_group, "every model: black, negative, 1e-300 and 1e300, in light of 1e-11 to 1e12 cd/m2",
-                "finite figures", "answers that are not; pictures with other numbers (file)"});
+                "finite figures", "results that are not finite; images with values that are not finite (file)"});
   row.on(Path::reference, 0, [](Denormals m) {
     double wrong = 0;
     for (const isp::AppearanceModel& model : isp::appearance_models()) {
@@ -279,7 +279,7 @@ TEST(HardCaseMesopic, PicturesAreWhatTheModelsSay) {
   HardCase row({appearance_group, "tables of models: every one of `develop --look`, 768 colours at 0.05 and 2 cd/m2",
                 "the table in plain double (sets); the model itself, from which a hundredth may be farther off (file)",
                 "relative (sets), CIEDE2000 (file)"});
-  row.none(Path::reference, "is the oracle").none(levels, "looks come after");
+  row.none(Path::reference, "is the reference itself").none(levels, "looks come after");
   // Float: 2^-24 in each of ten steps and in the place within a cell, times the number of cells, 32
   // (colour_table_test.cpp).
   row.on_each_set({42 * 0x1p-24, rounding}, tables_against_reference);

@@ -30,7 +30,7 @@ namespace {
 using isp::Lab;
 
 constexpr std::string_view colour_group = "Colour and light";
-constexpr std::string_view no_picture = "a measure of pictures, none itself";
+constexpr std::string_view no_picture = "a metric of images";
 constexpr double eps = std::numeric_limits<double>::epsilon();
 
 void figures_row(const About& about, const Bound& bound, const Measure& measure, std::string_view reason = no_picture) {
@@ -158,8 +158,8 @@ TEST(HardCaseColour, DivergencesOfSpectraWithZeros) {
 }
 
 TEST(HardCaseColour, GamutsWithoutArea) {
-  figures_row({colour_group, "5.4 gamuts of no area, of one line, of no colour", "closed form: no number, 0",
-               "answers that are not"},
+  figures_row({colour_group, "5.4 gamuts of no area, of one line, of no colour", "closed form: no value, or 0",
+               "wrong results"},
               0, [](Denormals m) {
                 return in_mode(m, [] {
                   const isp::GamutBins none;
@@ -175,9 +175,9 @@ TEST(HardCaseColour, GamutsWithoutArea) {
 
 // Single precision: 8 products and sums of values up to 65535, and half a code of rounding.
 TEST(HardCaseColour, RetargetingToADisplayThatIsNearlyDark) {
-  HardCase row({colour_group, "4 retargeted from 250 to 0.05 cd/m2: colours no display shows",
+  HardCase row({colour_group, "4 retargeted from 250 to 0.05 cd/m2: colours outside of the display's gamut",
                 "tetrahedra in plain double; half a code, and float", "codes of 16 bits"});
-  row.none(Path::reference, "is the oracle").none(levels, "pictures are finished");
+  row.none(Path::reference, "is the reference itself").none(levels, "input is a finished image");
   isp::RetargetOptions options;
   options.display_cd_m2 = 0.05;
   const auto map = *isp::retargeting(options);
@@ -196,19 +196,20 @@ TEST(HardCaseColour, RetargetingToADisplayThatIsNearlyDark) {
     }
     return worst;
   };
-  row.on_each_set(0.5 + 65535 * 16 * 0x1p-24, error).none(Path::file, "the same kernel: see the sets");
-  row.none(Path::live, "streams are for the display at hand");
+  row.on_each_set(0.5 + 65535 * 16 * 0x1p-24, error)
+      .none(Path::file, "the same kernel as in the columns of instruction sets");
+  row.none(Path::live, "streams do not support other displays");
 }
 
 TEST(HardCaseColour, ColoursOutsideTheGamut) {
   HardCase row({colour_group, "negative and over-white colours moved into the gamut",
                 "plain double; float, 1e-6 of the largest term", "of white"});
-  row.none(Path::reference, "is the oracle").none(levels, "looks come after");
+  row.none(Path::reference, "is the reference itself").none(levels, "looks come after");
   const isp::RgbTransform transform{
       {4, -2.5f, -0.5f, -1.5f, 3, -0.5f, 0.1f, -2.1f, 3}, {0.2126f, 0.7152f, 0.0722f}, 1.0f, true};
   const auto error = [&](Denormals m) { return linear_error({.transform = transform}, m); };
   row.on_each_set({1e-6, rounding}, error);
-  row.none(pipelines, "the same kernel: see the sets");
+  row.none(pipelines, "the same kernel as in the columns of instruction sets");
 }
 
 }  // namespace

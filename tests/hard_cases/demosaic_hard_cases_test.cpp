@@ -19,7 +19,7 @@ using isp::DemosaicMethod;
 constexpr std::string_view demosaic_group = "Demosaicing";
 constexpr std::string_view oracle = "plain double of every method";
 constexpr std::string_view unit = "of the cube root of white";
-constexpr std::string_view same_kernel = "the same kernels: see the instruction sets";
+constexpr std::string_view same_kernel = "the same kernels as in the columns of instruction sets";
 constexpr std::array phases{BayerPhase::rggb, BayerPhase::grbg, BayerPhase::gbrg, BayerPhase::bggr};
 
 /// Value of a mosaic at a column and row of a phase.
@@ -68,7 +68,7 @@ double distance_of(const Scene& scene, int width, int height, Denormals mode, co
 
 void measure(std::string_view name, const Bound& bound, const Measure& error) {
   HardCase row({demosaic_group, name, oracle, unit});
-  row.none(Path::reference, "is the oracle").none(levels, "demosaicing comes after");
+  row.none(Path::reference, "is the reference itself").none(levels, "demosaicing comes after");
   row.on_each_set(bound, error);
   row.none(pipelines, same_kernel);
 }

@@ -155,7 +155,7 @@ double live_against_reference(const Camera& camera, Denormals mode) {
 
 TEST(HardCaseTemporal, MeansOverFramesAreThoseOfTheReference) {
   HardCase row({denoise_invariances_group, "means over frames whose light changes by 1e-6 and 1e6",
-                "plain double; two roundings in float of what 0.1 e- of noise is times 1e6", "e-"});
+                "plain double; two roundings in float of 1e6 times 0.1 e- of noise", "e-"});
   const Camera camera = with_dark(5, 2);
   // A frame in the dark weighs 1/32 and has noise of 3 e-, up to five times that.
   const double bound = 2 * 0x1p-24 * 1e6 * 5 * 3 / 32;
@@ -187,7 +187,7 @@ TEST(HardCaseTemporal, MeansOverFramesAreThoseOfTheReference) {
     });
     return worst;
   });
-  row.none(levels, "frames before take part, not levels").on_each_set(bound, run);
+  row.none(levels, "applies to previous frames, not to levels").on_each_set(bound, run);
   row.none(Path::file, "a file is one frame");
   row.on(Path::live, bound + 1.0 / 16, [&](Denormals mode) { return live_against_reference(camera, mode); });
 }

@@ -27,8 +27,8 @@ namespace {
 using denoise_testing::flat;
 using test::inf;
 
-constexpr std::string_view extremes_group = "What the specifications do not name";
-constexpr std::string_view codes_are_whole = "codes are whole numbers";
+constexpr std::string_view extremes_group = "Other cases";
+constexpr std::string_view codes_are_whole = "codes are integers";
 constexpr double eps = std::numeric_limits<double>::epsilon();
 
 TEST(HardCaseExtreme, DenormalElectrons) {
@@ -43,7 +43,7 @@ TEST(HardCaseExtreme, DenormalElectrons) {
 TEST(HardCaseExtreme, DenormalsInRendering) {
   HardCase row({extremes_group, "samples of 1e-39, gains and matrices of 1e-30 and 1e30",
                 "plain double; 1e-6 of the largest term, or the smallest normal number", "relative"});
-  row.none(Path::reference, "is the oracle").none(levels, "looks come after");
+  row.none(Path::reference, "is the reference itself").none(levels, "looks come after");
   row.on_each_set({1e-6, rounding}, [](Denormals m) {
     double worst = 0;
     RenderedCase gain{.gain = {1e-30f, 1e-30f, 1e-30f, 1e-30f}};
@@ -100,13 +100,13 @@ TEST(HardCaseExtreme, WhiteBalanceOfAThousandInNoiseReduction) {
     }
     return worst;
   });
-  row.none(Path::live, "its prior is fixed, and neutral is what the noisiest colour says");
+  row.none(Path::live, "the prior is fixed, and the noisiest colour determines neutral");
 }
 
 TEST(HardCaseExtreme, WhiteBalanceOfAThousandInRendering) {
   HardCase row({extremes_group, "white balance 1000 : 1 : 1, rendered",
-                "plain double (sets); the neutral it stands for (others)", "relative; pixels that are no neutral"});
-  row.none(Path::reference, "is the oracle").none(levels, "looks come after");
+                "plain double (sets); the neutral itself (others)", "relative; pixels that are not neutral"});
+  row.none(Path::reference, "is the reference itself").none(levels, "looks come after");
   row.on_each_set({3e-7, rounding}, [](Denormals m) { return linear_error({.gain = {1, 1000, 1e-3f, 1}}, m); });
   row.on(Path::file, 0, [](Denormals m) { return neutral_through_file({0.001, 1, 1}, m); });
   row.on(Path::live, 0, [](Denormals m) { return neutral_through_live({0.001, 1, 1}, m); });
@@ -214,7 +214,7 @@ TEST(HardCaseExtreme, TemperaturesOfMinus40To85) {
   row.none(levels, "dark charge of 0.1 to 200 e-: see the invariances")
       .on_each_set(5, frames)
       .on(Path::file, 5, frames);
-  row.none(Path::live, "streams are given their black level, dark charge included");
+  row.none(Path::live, "streams get their black level with dark charge");
 }
 
 }  // namespace

@@ -96,7 +96,7 @@ inline void keep_worst(double& worst, double error) {
 }
 
 /// Reasons that several rows share.
-inline constexpr std::string_view no_image = "figures of one field, no image";
+inline constexpr std::string_view no_image = "a function of single values, not of images";
 inline constexpr std::string_view not_denoised = "nothing to denoise";
 inline constexpr std::string_view scalar_code = "no vector code";
 

@@ -20,7 +20,7 @@
 namespace lowlux::hard_cases {
 namespace {
 
-constexpr std::string_view large_frames_group = "What the specifications do not name";
+constexpr std::string_view large_frames_group = "Other cases";
 
 /// Codes of a row, the largest among them.
 std::vector<std::uint16_t> row_of_codes(int width) {
@@ -71,7 +71,7 @@ double error_by_columns(int width, int height, Denormals m) {
 
 TEST(HardCaseExtreme, SumsOverAHundredMegapixels) {
   HardCase row({large_frames_group, "sums of 100 megapixels of codes up to 65535", "exact integers", "relative"});
-  row.none(Path::reference, "is the oracle").none(levels, "noise is reduced block by block");
+  row.none(Path::reference, "is the reference itself").none(levels, "noise is reduced block by block");
   row.on_each_set(0, [](Denormals m) { return error_by_columns(10000, 10000, m); });
   row.on(Path::file, 0, [](Denormals m) {
     const auto dn = row_of_codes(10000);
@@ -81,7 +81,7 @@ TEST(HardCaseExtreme, SumsOverAHundredMegapixels) {
     });
     return error_of(sums.sums(), dn, 10000);
   });
-  row.none(Path::live, "its frame alone takes 200 MB: 12 megapixels below");
+  row.none(Path::live, "the frame needs 200 MB: see 12 megapixels below");
 }
 
 /// A camera's memory whose rows are all the same one, metered.
@@ -108,7 +108,7 @@ double error_of_meter(Denormals m) {
 
 TEST(HardCaseDenoise10, SumsOfTwelveMegapixels) {
   HardCase row({"Noise reduction", "9.10 sums over 12 megapixels", "exact integers", "relative"});
-  row.none(Path::reference, "is the oracle").none(levels, "noise is reduced block by block");
+  row.none(Path::reference, "is the reference itself").none(levels, "noise is reduced block by block");
   row.on_each_set(0, error_of_meter)
       .none(Path::file, "100 megapixels: see the last table")
       .on(Path::live, 0, error_of_meter);
@@ -116,8 +116,9 @@ TEST(HardCaseDenoise10, SumsOfTwelveMegapixels) {
 
 TEST(HardCaseExtreme, FramesOfOneRowOrColumn) {
   HardCase row({large_frames_group, "1 x N and N x 1, N to 5000; 1 x 1",
-                "plain double (sets), a picture or an error (others)", "relative; sizes without either"});
-  row.none(Path::reference, "is the oracle").none(levels, "2 x 2 at least: NoiseReduction says why not");
+                "plain double (sets), an image or an error (others)", "relative; sizes without either"});
+  row.none(Path::reference, "is the reference itself")
+      .none(levels, "needs at least 2 x 2 pixels: refused with a reason");
   row.on_each_set({4e-7, rounding}, [](Denormals m) {
     double worst = 0;
     for (const auto& [width, height] : {std::pair{1, 1}, {1, 7}, {7, 1}, {1, 5000}, {5000, 1}, {2, 1}, {1, 2}}) {
@@ -138,7 +139,7 @@ TEST(HardCaseExtreme, FramesOfOneRowOrColumn) {
 TEST(HardCaseSensor, MosaicsOfOnePixelAndOfOddSizes) {
   HardCase row({"Sensor and photons", "mosaics of 1 x 1, 1 x 5, 5 x 1, 5 x 7, 33 x 31",
                 "closed form: mean of the greens there are", "standard errors"});
-  row.none(Path::reference, "is one pixel").none(levels, "9.7: borders");
+  row.none(Path::reference, "the reference processes one pixel").none(levels, "see 9.7: borders");
   const auto error = [](Denormals m) {
     const RawFrame one = simulated({.luminance_cd_m2 = 1, .width = 1, .height = 1}, m);
     if (one.raw.dn.size() != 1) return std::numeric_limits<double>::infinity();
@@ -148,7 +149,7 @@ TEST(HardCaseSensor, MosaicsOfOnePixelAndOfOddSizes) {
     }
     return worst;
   };
-  row.on_each_set(5, error).on(Path::file, 5, error).none(Path::live, "1 x N: see the last table");
+  row.on_each_set(5, error).on(Path::file, 5, error).none(Path::live, "see the last table: 1 x N");
 }
 
 }  // namespace

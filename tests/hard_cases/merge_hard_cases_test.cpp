@@ -20,7 +20,7 @@ using test::Burst;
 constexpr std::string_view merge_group = "Merging";
 
 /// States why the other paths are not measured.
-void none_but_file(HardCase& row, std::string_view reference = "is the oracle") {
+void none_but_file(HardCase& row, std::string_view reference = "is the reference itself") {
   row.none(Path::reference, reference).none(levels, "noise reduction comes after");
   row.none(instruction_sets, scalar_code).none(Path::live, "streams are not merged");
 }
@@ -28,7 +28,7 @@ void none_but_file(HardCase& row, std::string_view reference = "is the oracle") 
 TEST(HardCaseMerge, PlainMean) {
   HardCase row({merge_group, "plain mean of 1 to 9 frames at rest", "plain double", "codes of 16 bits"});
   none_but_file(row);
-  row.on(Path::file, {1.01, "codes are rounded up by chance"}, [](Denormals m) {
+  row.on(Path::file, {1.01, "codes are rounded at random"}, [](Denormals m) {
     double worst = 0;
     for (const int count : {1, 2, 9}) {
       const Burst burst{.width = 61, .height = 47, .mean_e = 300};
@@ -65,7 +65,7 @@ double best_variance_e2(const std::vector<double>& lights, double signal_e) {
 TEST(HardCaseMerge, BracketOf24Ev) {
   HardCase row({merge_group, "bracket of 24 EV, in floating-point samples: means of bands of 0.01 to 1.5e7 e-",
                 "closed form: standard errors of the best weights", "standard errors"});
-  none_but_file(row, "the oracle is a closed form");
+  none_but_file(row, "the reference is a closed form");
   row.on(Path::file, 5, [](Denormals m) {
     const std::vector<double> lights{4096, 256, 16, 1, 1.0 / 16, 1.0 / 256, 1.0 / 4096};
     Burst burst{.width = 1024, .height = 64};

@@ -35,11 +35,12 @@ double relative(double found, double expected) {
   return std::abs(found - expected) / std::max(std::abs(expected), 1e-300);
 }
 
-constexpr std::string_view look_unit = "m (reference), parts of a grid of 0..1 (sets), of white (file), codes (live)";
+constexpr std::string_view look_unit =
+    "m (reference), fraction of the range of a grid (sets), of white (file), codes (live)";
 struct LookBounds {
   // Tables of 256 luminances and 32 S/P, and straight lines between cells: night_look_test.cpp.
   Bound sets{0.03, "the bound holds between the nodes of the look's tables: these fields are near one"};
-  Bound file{1.0 / 255, "the bound is a code of 8 bits, what can be seen of it"};
+  Bound file{1.0 / 255, "the bound is a code of 8 bits"};
   double live = 1 + 0.6;  // the same beyond rounding and the table of tone.h
 };
 
@@ -101,8 +102,8 @@ TEST(HardCaseMesopic, VisualNoiseAtAnyLight) {
     }
     return worst;
   });
-  row.none(Path::reference, "the sampler in double is the oracle").none(levels, "looks come after");
-  row.none(pipelines, "each row of cells is drawn by that call");
+  row.none(Path::reference, "the sampler in double is the reference itself").none(levels, "looks come after");
+  row.none(pipelines, "the same call as in the columns of instruction sets");
 }
 
 TEST(HardCaseMesopic, NoLightAtAll) {
@@ -116,7 +117,7 @@ TEST(HardCaseMesopic, NoLightAtAll) {
 
 // |h| of the answer is below 1e-12 (mesopic.cpp) and dh/dm is -1 or steeper where S/P is above 1.
 TEST(HardCaseMesopic, TheCycleOfTwo) {
-  HardCase row({mesopic_group, "1.1 S/P of 18 to 60, where the plain iteration never ends",
+  HardCase row({mesopic_group, "1.1 S/P of 18 to 60, where the plain iteration does not converge",
                 "root by bisection in 50 digits (reference); the look in plain double and its formula (others)",
                 look_unit});
   row.on(Path::reference, {1.1e-12, rounding}, [](Denormals m) {
@@ -158,16 +159,16 @@ TEST(HardCaseMesopic, ThreeFixedPoints) {
         }
         return worst;
       },
-      "looks hold their fields at 0.27: see the next row");
+      "looks limit S/P to 0.27 or more: see the next row");
 }
 
 // A lookup of m is off by 0.02 where m leaves 0 (spec 1.2). There the share of the rods falls 1 / (v0 S/P) = 12.3 times
 // as fast under this light: by 0.25, a quarter of what rods and cones differ by in orange, 0.23. Its channels keep a
 // fifth of their distance, and codes rise by at most 257 over the light that is left.
 TEST(HardCaseMesopic, FieldsOfALookAreHeldAboveTheThreeFixedPoints) {
-  HardCase row({mesopic_group, "1.1 looks under lights of S/P 0.2, whose fields are held at 0.27",
+  HardCase row({mesopic_group, "1.1 looks under lights of S/P 0.2, limited to 0.27",
                 "the look in plain double, and its formula", look_unit});
-  row.none(Path::reference, "is the oracle");
+  row.none(Path::reference, "is the reference itself");
   // Luminances of 0.01 to 0.2 cd/m2; at 0.0186 the table of m is farthest off.
   constexpr Rec709 grey{0.5f, 0.5f, 0.5f}, orange{0.9f, 0.3f, 0};
   measure_look(row,

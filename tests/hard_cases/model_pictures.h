@@ -7,8 +7,8 @@
 /// What models of appearance make of pictures, as `lowlux develop --look MODEL` has it.
 namespace lowlux::hard_cases {
 
-inline constexpr std::string_view through_tables = "pictures go through a table of the model: see tables of models";
-inline constexpr std::string_view no_models = "streams have the look of the camera or the eye";
+inline constexpr std::string_view through_tables = "images are processed by a table of the model: see tables of models";
+inline constexpr std::string_view no_models = "streams support the looks camera and eye only";
 
 /// A row of a model's figures for one colour.
 void model_row(const About& about, const Bound& bound, const Measure& measure);

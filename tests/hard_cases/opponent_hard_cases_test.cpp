@@ -92,7 +92,7 @@ TEST(HardCaseMesopic, ShinForwardAndInverse) {
 // Cones have next to no part in what is seen, so that no colour can come back: the answer is that of 0.05.
 TEST(HardCaseMesopic, ShinWhereAlphaIsHeld) {
   model_row({opponent_group, "4 Shin: 1e-3 and 3e-3 lx, where alpha is held to 0.05",
-             "the signals, by the coefficients held", "relative to white"},
+             "the signals, by the limited coefficients", "relative to white"},
             {5e-14, rounding}, [](Denormals m) {
               const isp::ShinEye eye = isp::shin_eye({});
               double worst = 0;
@@ -118,7 +118,7 @@ TEST(HardCaseMesopic, ShinWhereAlphaIsHeld) {
 // Y' of white is 0 for X = 1.7788, Z = 0; L_w + M_w = Y_w.
 TEST(HardCaseMesopic, WhitesThatLeaveRodsOrConesDark) {
   HardCase row({opponent_group, "2.7 Shin: whites of Y'_w = 0, L_w + M_w = 0, below 0, not a number", "an error",
-                "of six, taken"});
+                "of six, accepted"});
   row.on(Path::reference, 0, [](Denormals m) {
     double taken = 0;
     for (const Xyz& white : {Xyz{2.71012 / 1.52356, 1, 0}, Xyz{2, 1, 0.2}, Xyz{1, 0, 1}, Xyz{0, 0, 0},
@@ -128,7 +128,7 @@ TEST(HardCaseMesopic, WhitesThatLeaveRodsOrConesDark) {
     return taken;
   });
   row.none(levels, "looks come after").none(instruction_sets, through_tables);
-  row.none(Path::file, "pictures have D65 for white").none(Path::live, no_models);
+  row.none(Path::file, "the white of images is D65").none(Path::live, no_models);
 }
 
 }  // namespace

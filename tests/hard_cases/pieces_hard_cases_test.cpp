@@ -24,7 +24,7 @@ namespace {
 
 using denoise::Level;
 
-constexpr std::string_view pieces_group = "What the specifications do not name";
+constexpr std::string_view pieces_group = "Other cases";
 constexpr int period = 512;  // px, a multiple of tile_lattice_px
 constexpr double mean_e = 20, read_noise_e = 1.5;
 
@@ -104,12 +104,13 @@ double rows_of_100_megapixels(Denormals mode) {
 }
 
 TEST(HardCaseExtreme, AHundredMegapixelsAtOnce) {
-  HardCase row({pieces_group, "100 megapixels: rendered in one call, by pieces (file)",
-                "the same rows of a small picture", "rows that differ"});
-  row.none(Path::reference, "is plain loops").none(levels, "frames above 25 megapixels: see the next row");
+  HardCase row({pieces_group, "100 megapixels: rendered in one call, in tiles (file)", "the same rows of a small image",
+                "rows that differ"});
+  row.none(Path::reference, "the reference consists of plain loops")
+      .none(levels, "frames above 25 megapixels: see the next row");
   row.on_each_set(0, codes_of_100_megapixels);
   row.on(Path::file, 0, rows_of_100_megapixels);
-  row.none(Path::live, "its frame alone takes 200 MB");
+  row.none(Path::live, "the frame needs 200 MB");
 }
 
 /// Largest difference of parts of two float pictures, over the noise of a raw value of the same light.
@@ -176,15 +177,15 @@ double error_of_26_megapixels(Denormals mode) {
 // At most 3 % of the noise of a raw value (frame_tiles.h), of which the levels leave 5 % and more.
 TEST(HardCaseExtreme, AQuarterOfAHundredMegapixelsByPieces) {
   HardCase row({pieces_group, "frames above 25 megapixels: 26 (file), cores of 256 px (others), denoised",
-                "the same developed whole: inner parts of 2.4 megapixels (file), all (others)",
+                "the same frame developed without tiles: interior of 2.4 megapixels (file), everything (others)",
                 "noise of a raw value"});
-  row.none(Path::reference, "has no pieces");
+  row.none(Path::reference, "has no tiles");
   constexpr Bound bound{0.03, "the bound is that of any scene (frame_tiles.h)"};
   for (std::size_t i = 0; i < levels.size(); ++i) {
     row.on(levels[i], bound, [&](Denormals m) { return error_of_pieces(denoise::all_levels[i], m); });
   }
   row.on_each_set(bound, [](Denormals m) { return error_of_pieces(Level::standard, m); });
-  row.on(Path::file, bound, error_of_26_megapixels).none(Path::live, "frames of streams are not cut up");
+  row.on(Path::file, bound, error_of_26_megapixels).none(Path::live, "streams are processed without tiles");
 }
 
 }  // namespace

@@ -34,15 +34,15 @@ using test::nan;
 using test::two_threads;
 
 constexpr std::string_view sensor_group = "Sensor and photons";
-constexpr std::string_view drawn_before = "light is drawn by the camera";
-constexpr std::string_view no_colour_yet = "chromaticities are made later";
+constexpr std::string_view drawn_before = "the camera measures the light";
+constexpr std::string_view no_colour_yet = "chromaticities are computed later";
 
 MosaicCase without_light(double read_noise_e, int width, int height) {
   return case_of({.read_noise_e = read_noise_e}, flat(0, 0, 0), width, height, 91);
 }
 
 TEST(HardCaseSensor, NoPhotonIsNoElectronAndNoSpectrum) {
-  HardCase row({sensor_group, "no photon at all", "closed form: black, and no spectrum", "values that are not"});
+  HardCase row({sensor_group, "no photon at all", "closed form: black, and no spectrum", "values that are not 0"});
   row.on(Path::reference, 0, [](Denormals m) {
     return in_mode(m, [] {
       const auto means = isp::mean_photons(*isp::light_named("D65"), 0, 0.2);
@@ -116,7 +116,7 @@ TEST(HardCaseSensor, DarkChargeThatNoSourceStatesIsInTheFrame) {
     }
     return worst;
   });
-  row.none(Path::live, "exposures of films are short");
+  row.none(Path::live, "exposures of videos are short");
 }
 
 const std::array means_e{1e-12, 1e-9, 1e-6, 1e-3, 0.3, 1.0, 30.0, 1e3, 1e5, 1e6};
@@ -162,10 +162,10 @@ TEST(HardCaseSensor, MeansFromOneInABillionToAMillionAreExact) {
 }
 
 TEST(HardCaseSensor, WhatCannotBeDrawnIsRefused) {
-  HardCase row(
-      {sensor_group, "means above 1e6 that no full well holds", "an error that names the limit", "frames made of it"});
-  row.none(Path::reference, "refused before it is drawn").none(levels, not_denoised);
-  row.none(instruction_sets, "refused before it is drawn");
+  HardCase row({sensor_group, "means above 1e6, larger than any full well", "an error that names the limit",
+                "frames that are simulated"});
+  row.none(Path::reference, "refused before random draws").none(levels, not_denoised);
+  row.none(instruction_sets, "refused before random draws");
   row.on(Path::file, 0, [](Denormals m) {
     const Simulated light{.luminance_cd_m2 = 1e6, .clips = false};
     const auto error = refusal_of(light, m);
@@ -192,7 +192,8 @@ TEST(HardCaseSensor, AFrameWithoutLightStaysAtZero) {
 }
 
 TEST(HardCaseSensor, NegativeSumsHaveNoChromaticity) {
-  HardCase row({sensor_group, "X + Y + Z of 0 or less after subtraction", "there is none", "chromaticities given"});
+  HardCase row(
+      {sensor_group, "X + Y + Z of 0 or less after subtraction", "no chromaticity", "chromaticities returned"});
   row.on(Path::reference, 0, [](Denormals m) {
     const isp::Xyz dark{5, 6, 7};
     double given = 0;
@@ -206,7 +207,7 @@ TEST(HardCaseSensor, NegativeSumsHaveNoChromaticity) {
     const isp::Xy out = resaturated_flat({0.02f, 0.03f, 0.02f}, {0.03, 0.03, 0.03}, 1e-3, m);
     return std::hypot(out.x - 1.0 / 3, out.y - 1.0 / 3) < 1e-6 ? 0.0 : 1.0;
   });
-  row.none(Path::live, "streams subtract dark before there are colours");
+  row.none(Path::live, "in streams dark is subtracted before colours are computed");
 }
 
 TEST(HardCaseSensor, AsAlphaVanishesErrorsGrowByItsReciprocal) {
@@ -229,11 +230,11 @@ TEST(HardCaseSensor, AsAlphaVanishesErrorsGrowByItsReciprocal) {
            const isp::Xy out = resaturated_flat({0.031f, 0.03f, 0.03f}, {0.03, 0.03, 0.03}, 0.065e-3, m);
            return std::abs(out.x - 2.0 / 3) * (0.001 / 0.091) / 6e-8;
          });
-  row.none(Path::live, "streams subtract dark before there are colours");
+  row.none(Path::live, "in streams dark is subtracted before colours are computed");
 }
 
 TEST(HardCaseSensor, SaturatedChannelsAreFlagged) {
-  HardCase row({sensor_group, "channels full by well, converter, both", "which are, by the exposure", "wrong flags"});
+  HardCase row({sensor_group, "channels full by well, converter, both", "flags by the exposure", "wrong flags"});
   const auto wrong = [](Denormals m) {
     double count = 0;
     for (const double gain : {0.1, 0.5, 5.0}) {
@@ -244,12 +245,15 @@ TEST(HardCaseSensor, SaturatedChannelsAreFlagged) {
     }
     return count;
   };
-  row.on(Path::reference, 0, wrong).on_each_set(0, wrong).none(levels, "9.5: saturated sites").on(Path::file, 0, wrong);
-  row.none(Path::live, "9.5: saturated sites");
+  row.on(Path::reference, 0, wrong)
+      .on_each_set(0, wrong)
+      .none(levels, "see 9.5: saturated sites")
+      .on(Path::file, 0, wrong);
+  row.none(Path::live, "see 9.5: saturated sites");
 }
 
 TEST(HardCaseSensor, WhiteNotAboveBlackIsRefused) {
-  HardCase row({sensor_group, "white level at or below black, or NaN", "an error", "of three, taken"});
+  HardCase row({sensor_group, "white level at or below black, or NaN", "an error", "of three, accepted"});
   const std::array whites{512.0, 100.0, nan};
   row.on(Path::reference, 0, [&](Denormals m) {
     double taken = 0;
@@ -280,7 +284,7 @@ TEST(HardCaseSensor, WhiteNotAboveBlackIsRefused) {
 
 TEST(HardCaseSensor, ExposuresThatCannotBeAreRefused) {
   HardCase row({sensor_group, "exposures that are negative, infinite, NaN", "an error; streams measure instead",
-                "of four, taken"});
+                "of four, accepted"});
   const std::array times_s{-1e-9, -inf, inf, nan};
   const auto taken = [&](const auto& takes) {
     return static_cast<double>(std::count_if(times_s.begin(), times_s.end(), takes));
@@ -290,7 +294,7 @@ TEST(HardCaseSensor, ExposuresThatCannotBeAreRefused) {
       return in_mode(m, [&] { return isp::mean_photons(*isp::light_named("D65"), 1, t).has_value(); });
     });
   });
-  row.none(levels, not_denoised).none(instruction_sets, "refused before it is drawn");
+  row.none(levels, not_denoised).none(instruction_sets, "refused before random draws");
   row.on(Path::file, 0, [&](Denormals m) { return taken([&](double t) { return !refusal_of({.time_s = t}, m); }); });
   row.on(Path::live, 0, [&](Denormals m) {
     const MosaicCase c = without_light(3, 64, 48), next = case_of({.read_noise_e = 3}, flat(0, 0, 0), 64, 48, 92);
@@ -303,7 +307,7 @@ TEST(HardCaseSensor, ExposuresThatCannotBeAreRefused) {
 }
 
 TEST(HardCaseSensor, SingularSensitivitiesAreRefused) {
-  HardCase row({sensor_group, "singular matrix of sensitivities", "an error", "matrices made of it"});
+  HardCase row({sensor_group, "singular matrix of sensitivities", "an error", "matrices returned"});
   row.on(Path::reference, 0, [](Denormals m) {
     const auto nikon = *isp::camera_sensitivity("Nikon_D5100");
     return in_mode(m, [&] { return isp::spectral_matrix({nikon[0], nikon[0], nikon[2]}).has_value(); }) ? 1.0 : 0.0;
