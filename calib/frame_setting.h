@@ -15,9 +15,9 @@ struct FrameSetting {
   std::string model;
   SensorLayout layout = SensorLayout::bayer;
   BayerPhase phase = BayerPhase::rggb;
-  int width = 0;  // of the active area
+  int width = 0;  // width of the active area
   int height = 0;
-  std::array<double, 3> white_dn{};  // of R, G, B
+  std::array<double, 3> white_dn{};  // white levels of R, G, B
   std::optional<double> iso;
   std::optional<double> exposure_s;
   std::optional<double> temperature_c;

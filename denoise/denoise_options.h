@@ -17,7 +17,7 @@ namespace lowlux::denoise {
 enum class Level : std::uint8_t {
   draft,     // hard thresholds, blocks every 4 quads
   standard,  // hard thresholds, then empirical Wiener weights from that result, blocks every 4 quads
-  high,      // as `standard`, but with blocks every 2 quads
+  high,      // like `standard`, but with blocks every 2 quads
   best,      // both passes with blocks every 2 quads, then non-local Bayes
 };
 
@@ -52,6 +52,7 @@ struct RawNoise {
   std::array<double, 3> saturation_e{unsaturated_e, unsaturated_e, unsaturated_e};  // levels of R, G, B
 };
 
+/// Holds the options of Denoiser.
 struct DenoiseOptions {
   Level level = Level::standard;
   std::array<double, 3> white_gain{1, 1, 1};  // R, G, B; 1e-3..1e3. Undone at the end; neutral detail must be equal

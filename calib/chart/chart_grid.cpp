@@ -159,7 +159,7 @@ std::optional<ChartGrid> refined(const ChartGrid& start, RgbView<const float> pi
   if (!std::isfinite(best)) return std::nullopt;
   const double cell_px = std::hypot(corners[1].x - corners[0].x, corners[1].y - corners[0].y) / chart_columns;
   constexpr std::array steps_cells{0.2, 0.1, 0.05, 0.025, 0.0125};
-  constexpr int max_rounds = 20;  // of one step size
+  constexpr int max_rounds = 20;  // largest number of rounds of one step size
   for (const double step : steps_cells) {
     bool better = true;
     for (int round = 0; better && round < max_rounds; ++round) {

@@ -26,8 +26,8 @@ ChartPicture chart_picture(const SignalFraction& mosaic, const RawDn& raw);
 /// Measurement of one patch of a chart.
 struct ChartPatch {
   Vector3 camera_rgb{};          // mean, 1 at the white level; signed
-  Vector3 standard_error{};      // of the mean, from the pixels' scatter
-  double clipped_fraction = 0;   // of its pixels; these are excluded from the mean
+  Vector3 standard_error{};      // standard error of the mean, from the pixels' scatter
+  double clipped_fraction = 0;   // fraction of its pixels; these are excluded from the mean
   double outlying_fraction = 0;  // more than five robust standard deviations off: hot pixels, dirt; excluded too
   int pixels = 0;                // number in the mean
 };

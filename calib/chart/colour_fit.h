@@ -28,6 +28,7 @@ struct LightGradient {
   double at(double x, double y) const { return 1 + x * per_x + y * per_y; }
 };
 
+/// Holds the options of fit_colour().
 struct ColourFitOptions {
   isp::Xyz white;                  // of a perfect diffuser under the chart's light, Y = 1: CIELAB is relative to it
   bool uneven_light = true;        // fit a LightGradient as well
@@ -40,7 +41,7 @@ struct ColourFitOptions {
 struct ColourFit {
   Matrix3 camera_to_xyz;        // to XYZ under the chart's light, for the light at the chart's middle
   LightGradient light;          // zero unless it was fitted
-  double condition_number = 1;  // of the least-squares equations, their columns scaled to length 1
+  double condition_number = 1;  // condition number of the least-squares equations, their columns scaled to length 1
 };
 
 /// Minimum number of samples for a fit: one and a half times the unknowns, nine of the matrix and two of the light.
@@ -75,10 +76,11 @@ Result<ColourFit> scaled_to_chart(const Matrix3& camera_to_xyz, std::span<const 
 
 /// Converts a fit to the form of DNG. ColorMatrix: XYZ under the chart's light to camera RGB, the largest component of
 /// white's 1; ForwardMatrix: white-balanced camera RGB to XYZ under D50 (Bradford), mapping (1, 1, 1) to D50.
-/// @param white of a perfect diffuser under the chart's light, Y = 1
+/// @param white colour of a perfect diffuser under the chart's light, Y = 1
 /// Error (insufficient): the matrix is singular, or white would leave a channel dark.
 Result<ColourCalibration> calibration_of(const ColourFit& fit, const isp::Xyz& white);
 
+/// Summarises colour errors over patches [CIEDE2000].
 struct ErrorSummary {
   double mean = 0;
   double median = 0;

@@ -24,7 +24,7 @@ struct DarkLevel {
   DarkExposure exposure;
   double frames = 1;
   double level_dn = 0;      // mean of the sites
-  double variance_dn2 = 0;  // of that mean
+  double variance_dn2 = 0;  // variance of that mean
 };
 
 /// Additional information for scaling darks.

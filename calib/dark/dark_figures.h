@@ -57,15 +57,15 @@ struct DarkSeries {
   double row_noise_e = 0;     // temporal
   double column_noise_e = 0;  // fixed
   std::vector<HotPixel> hot;  // row by row, found in the group with most dark charge
-  std::optional<double> hot_temperature_c;  // of that group, where it is stated
+  std::optional<double> hot_temperature_c;  // temperature of that group, if it is stated
   double excluded_fraction = 0;             // fraction of all pixels, excluded from all means
   double largest_correction_dn = 0;         // largest correction of a mean for excluded pixels
   std::optional<Estimate>
-      read_noise_e;  // of a pixel about its row, from the group with least dark charge; absent if not measurable
+      read_noise_e;  // deviation of a pixel from its row, in the group with least dark charge; absent if not measurable
   std::vector<DarkPoint> points;  // four for each group
   double reduced_chi_square = 0;  // mean square of residual / error: about 1 where the mean is linear in time
   int degrees_of_freedom = 0;
-  Plane<float> pedestal_map_dn;      // of every pixel, outliers included
+  Plane<float> pedestal_map_dn;      // pedestal of every pixel, outliers included
   Plane<float> current_map_e_per_s;  // at the temperature where the dark current is largest
 };
 

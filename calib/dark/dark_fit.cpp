@@ -186,7 +186,7 @@ void for_each_count(double mean, const Visit& visit) {
   const double reach = 10 * std::sqrt(mean) + 40;
   const double first = std::max(0.0, std::floor(mean - reach)), last = std::ceil(mean + reach);
   const double counts = last - first + 1;  // 0 for a NaN mean
-  int sign = 0;                            // of the gamma function; needed by its thread-safe form
+  int sign = 0;                            // sign of the gamma function; needed by its thread-safe form
   for (int i = 0; i < counts; ++i) {
     const double k = first + i;
     visit(k, mean > 0 ? std::exp(k * std::log(mean) - mean - ::lgamma_r(k + 1, &sign)) : (k == 0 ? 1.0 : 0.0));

@@ -34,7 +34,7 @@ struct DarkFit {
   std::vector<PerSite<double>> correction_dn;  // to be added to the means
   PixelMask mask;
   Design design;
-  std::array<Design, 4> estimators;  // of each site: pedestal, then one slope for each temperature
+  std::array<Design, 4> estimators;  // estimators of each site: pedestal, then one slope for each temperature
 };
 
 /// Begins a fit: separates the temperatures, and masks pixels more than 5 standard deviations from their site's median
@@ -55,7 +55,7 @@ std::vector<DarkPoint> points_of(const DarkFit& fit, std::span<const PerSite<Est
 /// Returns the temporal noise of a pixel about its row, without dark charge and quantisation [e-]; nullopt if the
 /// remaining variance is not positive.
 /// @param group  with little dark charge
-/// @param dark_charge_dn  of each site, in that group
+/// @param dark_charge_dn  dark charge of each site, in that group
 std::optional<Estimate> read_noise_of(const DarkFit& fit, std::size_t group, const PerSite<double>& dark_charge_dn);
 
 /// Returns a map of a parameter for every pixel: the groups' means weighted by the estimators `parameter` of their

@@ -92,7 +92,7 @@ std::vector<DarkLevel> levels_of(const Job& job) {
 
 /// Returns the mean of a site's pixels without outliers, as masked pixels are measured where the gain is known: a dark
 /// charge of less than an electron is in few pixels, and not in the median.
-/// @param exposures  of which each pixel is the mean
+/// @param exposures  exposures of which each pixel is the mean
 double mean_level_dn(const DarkGroup& group, int site, const SiteSpread& spread, double gain_dn_per_e,
                      double exposures) {
   const double cut = level_cut * std::max(spread.deviation, 0.5 / exposures);

@@ -32,12 +32,12 @@ struct ImageFigures {
   double pixels = 0;
   double mean = 0;
   double standard_error = 0;     // includes the variance common to rows and columns
-  double variance = 0;           // of pixels, spatial and remaining temporal noise together
+  double variance = 0;           // variance of pixels, spatial and remaining temporal noise together
   double column_variance = 0;    // the part of `variance` that whole columns have in common; unbiased, may be negative
   double temporal_variance = 0;  // the part of `variance` that follows from the groups' temporal noise
   /// Change from edge to edge of straight lines through the means of columns (x) and of rows (y).
   double change_x = 0, change_y = 0, error_x = 0, error_y = 0;
-  double row_variance = 0;  // as column_variance, for whole rows
+  double row_variance = 0;  // like column_variance, for whole rows
 };
 ImageFigures figures_of(const WeightedImage& image, const PixelMask& mask, int site);
 

@@ -38,7 +38,7 @@ struct Parts {
   double mean = 0;
   Lines columns, rows;
   double low_dn = 0, high_dn = 0;  // limits of outliers
-  double variance = 0;             // of the remainder, in pixels that are not outliers
+  double variance = 0;             // variance of the remainder, in pixels that are not outliers
   double inside = 0;               // fraction of pixels that are not outliers
   bool is_inside(double dn) const { return dn >= low_dn && dn <= high_dn; }
   double rest(const Plane<float>& dn, int x, int y) const {

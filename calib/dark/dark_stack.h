@@ -15,7 +15,7 @@ struct DarkGroup {
   FrameSetting setting;
   int frames = 0;             // files; each may itself be a mean of several exposures, a master dark
   bool rounded = true;        // the files hold whole codes
-  Plane<float> mean_dn;       // of the frames, for each pixel
+  Plane<float> mean_dn;       // mean of the frames, for each pixel
   Plane<float> variance_dn2;  // temporal, for each pixel, about the mean of its site in each frame, as EMVA 1288 has
                               // it: drift and flicker of whole frames are not in it; quantisation included; unbiased
   PerSite<double> row_variance_dn2{};    // the part of it that whole rows have in common; unbiased, may be negative
@@ -66,8 +66,8 @@ class DarkStack {
   Plane<std::uint16_t> first_;  // the accumulated values are differences to it, to avoid cancellation
   Plane<std::int32_t> sum_;
   Plane<float> squares_;
-  std::vector<double> row_sum_, row_squares_;      // of row means, two for each row: even and odd columns
-  PerSite<double> frame_sum_{}, frame_squares_{};  // of means of frames; all squares are about these means
+  std::vector<double> row_sum_, row_squares_;      // sums of row means, two for each row: even and odd columns
+  PerSite<double> frame_sum_{}, frame_squares_{};  // sums of the means of frames, about which all squares are computed
   PerSite<std::int64_t> at_zero_{};
 };
 

@@ -57,7 +57,7 @@ struct Deviation {
 
 /// Puts the quality of the fit into the law. Where the currents follow another law, as Arrhenius' with a floor, they
 /// deviate alike in all channels: the deviations of the temperatures, not of their channels, are independent.
-/// @param deviations  of the logarithms from the law
+/// @param deviations  deviations of the logarithms from the law
 /// @return the factor of the standard errors
 double judge(std::span<const LogPoint> points, std::span<const double> deviations, DarkTemperatureLaw& law) {
   double chi_square = 0;

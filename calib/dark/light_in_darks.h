@@ -15,7 +15,7 @@ namespace lowlux::calib {
 
 /// Statistics of one site of a group of darks.
 struct DarkSite {
-  SiteSpread spread;     // of the means
+  SiteSpread spread;     // spread of the means
   double noise_dn2 = 0;  // temporal, of one frame
 };
 

@@ -31,7 +31,7 @@ struct SiteFlat {
   double noise2 = 0;     // relative variance of the noise of a pixel
   double pattern2 = 0;   // relative variance of the response of a pixel
   double weight = 0;     // w
-  GainNoise noise;       // of the gains
+  GainNoise noise;       // noise of the gains
 };
 
 Plane<float> signal_of(const DarkGroup& flats, int site, double black_dn) {

@@ -37,7 +37,7 @@ struct Codes {
 
 struct RowSite {
   int y;
-  int parity;  // of the site's columns
+  int parity;  // parity of the site's columns
   double white_dn;
 };
 

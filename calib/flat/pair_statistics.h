@@ -13,7 +13,7 @@ namespace lowlux::calib {
 struct SiteStatistics {
   std::int64_t pixels = 0;
   int rows = 0;
-  double mean_dn = 0;       // of both frames
+  double mean_dn = 0;       // mean of both frames
   double drift_dn = 0;      // mean of b less mean of a
   double variance_dn2 = 0;  // temporal: half the variance of b - a about its mean (EMVA 1288), quantisation included
   double row_variance_dn2 = 0;  // the part common to whole rows; unbiased, may be negative

@@ -28,7 +28,7 @@ struct Saturation {
 struct PhotonTransfer {
   Estimate system_gain_dn_per_e;              // K: one for all sites
   PerSite<Estimate> gain_of_site_dn_per_e{};  // each site fitted alone: should agree with K
-  double reduced_chi_square_of_sites = 0;     // of the four gains about the common one, 3 degrees of freedom
+  double reduced_chi_square_of_sites = 0;     // chi square of the four gains about the common one, 3 degrees of freedom
   std::optional<Estimate> read_noise_e;       // temporal dark noise at the darks' exposure; absent if under-dithered
   bool under_dithered = false;                // darks scatter by less than half a code: see quantisation_bounds()
   double row_noise_e = 0;                     // the part of the read noise common to whole rows
@@ -38,11 +38,11 @@ struct PhotonTransfer {
   std::optional<Estimate> saturation_capacity_e;
   std::optional<Saturation> saturation;  // mean charge of flats without photon noise; absent if there are none
   Estimate prnu;  // relative, at half saturation; contains the nonuniformity of dark current that the darks lack
-  std::optional<Estimate> dsnu_e;         // of the darks; absent if under-dithered
+  std::optional<Estimate> dsnu_e;         // DSNU of the darks; absent if under-dithered
   std::optional<double> linearity_error;  // EMVA LE: mean relative deviation from the line, 5 to 95 % of range
-  double reduced_chi_square = 0;          // of variance against mean
+  double reduced_chi_square = 0;          // reduced chi square of variance against mean
   int degrees_of_freedom = 0;
-  int levels = 0;                             // of light, in the linear range of the site that has fewest
+  int levels = 0;                             // levels of light in the linear range of the site that has fewest
   PerSite<double> black_standard_error_dn{};  // from noise and rows; columns and other patterns are part of the black
 };
 

@@ -32,7 +32,7 @@ struct DarkScatter {
 struct TransferLine {
   Estimate gain_dn_per_e;
   Estimate offset_dn2;
-  double covariance = 0;  // of gain and offset
+  double covariance = 0;  // covariance of gain and offset
   double chi_square = 0;
   int degrees_of_freedom = 0;
 };
@@ -63,6 +63,7 @@ struct TransferPeak {
   bool reached = false;
 };
 
+/// Holds the variance against mean of all pairs of flats, and where it ends.
 struct TransferCurve {
   std::vector<TransferPoint> flats;  // all flats
   PerSite<TransferPeak> peak{};

@@ -21,6 +21,7 @@ struct DarktableNoise {
   double b = 0;  // may be below 0
 };
 
+/// Names a camera of darktable's noise table, with its noise by ISO.
 struct DarktableCamera {
   std::string maker;
   std::string model;
@@ -42,7 +43,7 @@ Result<DarktableTable> parse_darktable_noise(std::string_view json);
 struct DarktableMatch {
   NoiseFigures figures;
   std::string camera;      // maker and model as the table has them
-  double iso = 0;          // of the frame
+  double iso = 0;          // ISO of the frame
   double low_iso = 0;      // entries that were used, equal if it is one
   double high_iso = 0;     //
   bool is_beyond = false;  // the frame's ISO is outside of the entries: extrapolated

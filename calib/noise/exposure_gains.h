@@ -14,7 +14,7 @@ namespace lowlux::calib {
 /// ISO speed of each, else those that cameras of the format's class have in the median (class_noise). The well holds
 /// what the largest code of the lowest gain does.
 /// @param factors   analogue gains, rising, above 0; 1 is ISO 100
-/// @param white_dn  of the stream
+/// @param white_dn  white level of the stream
 /// @param profile   null: none
 /// Errors: those of gain_at_iso.
 Result<std::vector<isp::GainStep>> exposure_gains(std::span<const double> factors, const RawFormat& format,

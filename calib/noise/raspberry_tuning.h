@@ -34,7 +34,7 @@ Result<RaspberryTuning> parse_raspberry_tuning(std::string_view json);
 /// Describes the sensor of a tuning file, which states neither.
 struct TunedSensor {
   std::string name;
-  int bits = 0;          // of the sensor's codes, 8 to 16
+  int bits = 0;          // bits of the sensor's codes, 8 to 16
   double max_gain = 16;  // largest analogue gain, above 1
   std::string source;    // file and version
 };

@@ -67,7 +67,7 @@ Sum quietest_of(std::span<const NoiseSample> group, double share, std::vector<No
 }
 
 struct Limits {
-  double low = 0, middle = 0, high = 0;  // of an energy relative to the line
+  double low = 0, middle = 0, high = 0;  // factors of an energy relative to the line
   double mean_below = 1;
 };
 

@@ -26,10 +26,11 @@ struct FlatRule {
   double high_fraction = 0.98;   // fraction of flat samples in the average: the others count as texture
 };
 
+/// Holds the samples of flat areas, grouped by brightness.
 struct FlatPoints {
   std::vector<NoisePoint> points;
   double samples = 0;    // number kept
-  double mean_high = 0;  // of kept samples, relative to the line: for noise alone both means are 1
+  double mean_high = 0;  // mean of high details relative to the line; for pure noise both means are 1
   double mean_middle = 0;
 };
 
@@ -39,7 +40,7 @@ struct FlatPoints {
 /// does not change the mean of the high ones. The distribution of clipped pixels is skewed: there a strict selection
 /// prefers dark samples, which is why the fractions are high. The bias from excluding the largest high ones is
 /// corrected (chi_square_mean_below).
-/// @param clip of each site
+/// @param clip clip of each site
 FlatPoints flat_points(const NoiseSamples& samples, const NoiseLine& line, const PerSite<ClipRange>& clip,
                        const FlatRule& rule);
 

@@ -17,7 +17,7 @@ struct ClipRange {
 struct NoisePoint {
   double mean_dn = 0;  // above black
   double variance_dn2 = 0;
-  double degrees_of_freedom = 0;  // of the variance; above 0
+  double degrees_of_freedom = 0;  // degrees of freedom of the variance; above 0
   ClipRange clip;
 };
 
@@ -26,7 +26,7 @@ struct NoisePoint {
 struct NoiseLine {
   Estimate gain_dn_per_e;
   Estimate offset_dn2;
-  double covariance = 0;  // of gain and offset
+  double covariance = 0;  // covariance of gain and offset
   double reduced_chi_square = 0;
   int degrees_of_freedom = 0;
   double contrast_squared = 0;  // at least 0

@@ -12,11 +12,11 @@ namespace lowlux::calib {
 /// One small patch of pixels of one colour. All energies are means of squares of orthonormal details: for noise alone,
 /// each is a chi square divided by its degrees of freedom, times the variance, and independent of the others.
 struct NoiseSample {
-  float mean_dn = 0;    // of the patch, above black
+  float mean_dn = 0;    // mean of the patch, above black
   float around_dn = 0;  // mean of the pixels around the patch, whose noise is independent of the patch's
-  float low_dn2 = 0;    // of coarse details, in which texture is strongest
+  float low_dn2 = 0;    // variance of coarse details, in which texture is strongest
   float middle_dn2 = 0;
-  float high_dn2 = 0;     // of the finest details, which are taken for noise
+  float high_dn2 = 0;     // variance of the finest details, which are considered as noise
   std::uint8_t site = 0;  // for greens: that of the upper one, for both
 };
 
@@ -26,9 +26,10 @@ struct DetailCount {
   int middle = 0;
   int high = 0;
   double step_fraction = 0;         // variance of mean_dn - around_dn for noise alone, relative to a pixel's
-  double independent_fraction = 1;  // of the high ones: neighbouring samples may have pixels in common
+  double independent_fraction = 1;  // independent fraction of the high details: neighbouring samples may share pixels
 };
 
+/// Holds the noise samples of an image.
 struct NoiseSamples {
   DetailCount details;
   std::vector<NoiseSample> sample;

@@ -17,6 +17,7 @@ namespace lowlux::calib {
 /// Details that are taken for noise: see block_samples and detail_samples.
 enum class PictureNoiseMethod : std::uint8_t { ponomarenko, foi };
 
+/// Holds the options of fit_picture_noise().
 struct PictureNoiseOptions {
   PictureNoiseMethod method = PictureNoiseMethod::ponomarenko;  // foi is biased by texture more easily
   std::int64_t max_samples =
@@ -35,7 +36,7 @@ struct PictureNoiseOptions {
 struct PictureNoise {
   Estimate gain_dn_per_e;
   Estimate offset_dn2;
-  double covariance = 0;  // of gain and offset
+  double covariance = 0;  // covariance of gain and offset
   double reduced_chi_square = 0;
   int degrees_of_freedom = 0;
   double darkest_dn = 0;  // range of the means of the fitted samples, above black, as read
@@ -52,7 +53,7 @@ struct PictureNoise {
 
 /// Fits gain and offset to the active area: one of each for all sites, each colour measured on its own pixels. Clipping
 /// at the smallest code in use and at white is modelled (noise_line.h).
-/// @param black_dn of each site
+/// @param black_dn black levels of each site
 /// Errors: a layout other than Bayer or monochrome; floating-point samples; black that is not below white; options
 /// outside their range; fewer than 100 samples; more than 90 % of the pixels clipped; too few flat samples; levels too
 /// similar to separate gain from offset (a gain that is not positive, or known to less than 15 %); an offset below 0 by
@@ -72,11 +73,11 @@ Result<PictureNoise> fit_picture_noise(const RawDn& raw, const PerSite<double>& 
 
 /// Comparison of one channel of a file's noise profile with the noise of the image.
 struct NoiseAgreement {
-  double gain_dn_per_e = 0;  // of the profile, in the units of PictureNoise
+  double gain_dn_per_e = 0;  // gain of the profile, in the units of PictureNoise
   double offset_dn2 = 0;
   double gain_ratio = 0;  // measured to the profile's; 0 where the profile's is 0
   double offset_ratio = 0;
-  double chi_square = 0;  // of the two differences, 2 degrees of freedom
+  double chi_square = 0;  // chi square of the two differences, 2 degrees of freedom
   bool agrees = false;    // chi square below 11.8 (three standard errors), or both within 10 %
 };
 

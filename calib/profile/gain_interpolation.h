@@ -15,13 +15,13 @@ struct GainAtIso {
 };
 
 /// Interpolates a profile's gain settings at an ISO.
-/// @param iso  of the frame; absent if it states none
+/// @param iso  ISO of the frame; absent if it states none
 /// @param profile  has gain settings
 /// Errors: see profile_at.
 Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<double>& iso);
 
 /// Returns the properties of a named gain setting.
-/// @param name  of a setting, as in the profile ("gain 120"), or an ISO ("ISO 1600", "1600"), measured or not
+/// @param name  name of a setting, as in the profile ("gain 120"), or an ISO ("ISO 1600", "1600"), measured or not
 /// Errors: the profile has no such setting; see profile_at.
 Result<GainAtIso> gain_named(const CameraProfile& profile, const std::string& name);
 

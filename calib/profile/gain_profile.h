@@ -26,8 +26,8 @@ struct LineScatter {
 /// Results from dark pixels of one exposure time: the pedestal including the dark charge.
 struct BlackFigures {
   PerSite<Estimate> level_dn{};    // errors include row and column terms
-  PerSite<double> deviation_dn{};  // of the pixels that were kept, in one frame
-  PerSite<LineScatter> rows{};     // of the mean of the frames
+  PerSite<double> deviation_dn{};  // standard deviation of the pixels that were kept, in one frame
+  PerSite<LineScatter> rows{};     // scatter of the mean of the frames
   PerSite<LineScatter> columns{};
   double row_noise_dn = 0;     // common to whole rows of one frame beyond white noise, mean of the sites
   double column_noise_dn = 0;  // fixed

@@ -13,7 +13,7 @@ namespace lowlux::calib {
 /// Holds limits of a JSON text.
 struct JsonLimits {
   std::size_t max_depth = std::numeric_limits<std::size_t>::max();  // objects and lists around a value
-  std::size_t max_keys = std::numeric_limits<std::size_t>::max();   // of one object
+  std::size_t max_keys = std::numeric_limits<std::size_t>::max();   // largest number of keys of one object
 };
 
 /// Holds the reason for which a JSON text is not read.

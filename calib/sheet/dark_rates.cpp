@@ -99,7 +99,7 @@ class LawFit {
   std::span<const RateAtTemperature> rates_;
   std::vector<double> inverse_kt_;  // [1/eV]
   std::vector<double> weights_;
-  double reference_ = 0;  // of the highest temperature [1/eV]
+  double reference_ = 0;  // reference of the highest temperature [1/eV]
 };
 
 int temperatures_of(std::span<const RateAtTemperature> rates) {

@@ -39,6 +39,7 @@ struct DarkRate {
   int exposures = 0;
 };
 
+/// Holds the dark current at several temperatures, and its laws.
 struct DarkRates {
   std::vector<DarkRate> rates;  // by rising temperature
   /// By the means of two or more temperatures; absent if one is not above 0. Its standard error is larger where

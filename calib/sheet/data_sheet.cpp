@@ -31,7 +31,7 @@ struct DarkOfFlats {
 class DarkLevels {
  public:
   /// @param groups  one or more, the shortest exposure first; they have to outlive this
-  /// @param rates   of these groups
+  /// @param rates   rates of these groups
   DarkLevels(std::span<const DarkGroup> groups, const std::optional<DarkRates>& rates, const Estimate& gain_dn_per_e);
 
   /// Returns the level of darks that belong to flats (EMVA 1288 R4 takes darks of their exposure time): that of the

@@ -17,7 +17,7 @@ namespace lowlux::calib {
 /// Light of known power on the sensor, constant over all flats.
 struct Irradiance {
   double w_per_m2 = 0;
-  double wavelength_nm = 0;  // of its single or central wavelength
+  double wavelength_nm = 0;  // single or central wavelength
   double pixel_um2 = 0;      // area of a pixel
 };
 
@@ -26,7 +26,7 @@ double photons_of(const Irradiance& light, double exposure_s);
 
 /// Frames of one gain setting.
 struct SheetFrames {
-  std::vector<PairStatistics> dark_pairs;  // of the shortest exposure
+  std::vector<PairStatistics> dark_pairs;  // pairs of darks of the shortest exposure
   std::vector<PairStatistics> flat_pairs;
   std::vector<DarkGroup> darks;     // by exposure and temperature; the first is of the shortest exposure
   std::optional<DarkGroup> bright;  // flats near half of saturation; absent: PRNU is not split
@@ -49,7 +49,7 @@ struct DataSheet {
   std::optional<DarkRates> dark_rates;
   Nonuniformity dsnu_e;
   std::optional<Nonuniformity> prnu;                          // relative
-  std::optional<std::array<Estimate, 3>> quantum_efficiency;  // of R, G, B; without filters three times the same
+  std::optional<std::array<Estimate, 3>> quantum_efficiency;  // values of R, G, B; without filters three equal values
   std::vector<std::string> warnings;                          // figures that contain dark current, saturated darks
 };
 

@@ -57,7 +57,8 @@ struct FrameFacts {
   std::optional<double> temperature_c;  // temperature of the sensor
 };
 
-/// One frame in the camera's own memory, which may be uncached: read each row once. Borrowed until Camera::give_back.
+/// One frame in the camera's own memory, which may be uncached: read each row once. Borrowed until
+/// Camera::return_buffer.
 struct CameraFrame {
   std::span<const std::byte> bytes;       // rows from the first byte on, CameraFormat::stride_bytes apart
   std::uint32_t sequence = 0;             // frame number that the device counts
@@ -65,7 +66,7 @@ struct CameraFrame {
   std::chrono::nanoseconds timestamp{0};  // time by CLOCK_MONOTONIC
   bool damaged = false;                   // the device reports that the data differ from those of the sensor
   FrameFacts facts;
-  int buffer = 0;  // index for Camera::give_back
+  int buffer = 0;  // index for Camera::return_buffer
 };
 
 /// One of the gains that a camera can be set to.

@@ -73,7 +73,7 @@ std::optional<Matrix3> matrix_of(const FrameFacts& facts, RawFrame& out) {
 }
 
 /// Returns the calibration of a colour matrix; nullopt if its values exceed the range of a DNG.
-/// @param to_srgb  of white-balanced camera RGB
+/// @param to_srgb  to srgb of white-balanced camera RGB
 std::optional<ColourCalibration> calibration_of(const Matrix3& to_srgb, const Vector3& neutral,
                                                 const std::optional<double>& cct_k) {
   const auto light = cct_k ? isp::white_of_temperature(*cct_k) : std::nullopt;

@@ -17,6 +17,7 @@ struct LoopLimits {
   std::chrono::milliseconds timeout{5000};  // for each undamaged frame
 };
 
+/// Counts the frames of a capture.
 struct LoopCount {
   std::uint64_t taken = 0;
   std::uint64_t skipped = 0;

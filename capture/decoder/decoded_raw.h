@@ -7,6 +7,7 @@
 
 namespace lowlux::capture {
 
+/// Lists how decoding in the separate program ends.
 enum class DecodeOutcome : std::uint32_t {
   crashed = 0,  // zero, the value of fresh memory: nothing was written
   decoded,
@@ -35,7 +36,7 @@ struct DecodedHeader {
   std::uint32_t maximum;
   float camera_multiplier[4];  // R, G, B, second G; 0 or less where unknown
   float xyz_to_camera[3][3];   // all 0 where unknown
-  float camera_to_srgb[3][3];  // of white-balanced camera RGB; all 0 where unknown, or known by xyz_to_camera
+  float camera_to_srgb[3][3];  // matrix of white-balanced camera RGB; all 0 if unknown or given by xyz_to_camera
   std::uint32_t dng_version;
   std::uint32_t is_guessed_by_size;  // 1: the file has no header that the decoder knows
   double pixel_aspect;
@@ -46,8 +47,9 @@ struct DecodedHeader {
 };
 static_assert(std::is_trivially_copyable_v<DecodedHeader>);
 
-inline constexpr std::uint32_t x_trans_filters = 9;  // what LibRaw calls X-Trans mosaics
+inline constexpr std::uint32_t x_trans_filters = 9;  // LibRaw's value for X-Trans mosaics
 
+/// Holds the samples that the separate program decoded, and their header.
 struct DecodedRaw {
   DecodedHeader header{};
   Plane<std::uint16_t> samples;  // raw_height x (raw_width * samples)

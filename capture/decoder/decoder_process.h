@@ -21,6 +21,7 @@ namespace lowlux::capture {
 Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadLimits& limits,
                                     std::vector<std::string> command);
 
+/// Lists the programs that decode in a separate process.
 enum class DecoderProgram : std::uint8_t {
   libraw,  // lowlux-decode, of raw files
   libjxl,  // lowlux-decode-jxl, of a JpegXlJob; built where libjxl is

@@ -68,7 +68,7 @@ bool keeps_its_colours(Query query, const JxlDecoder* decoder, const JxlBasicInf
 
 struct Decoded {
   int width = 0, height = 0;
-  std::vector<std::uint16_t> samples;  // of full scale
+  std::vector<std::uint16_t> samples;  // samples in units of full scale
 };
 
 /// Returns what is wrong with the header of a part; null if nothing is.

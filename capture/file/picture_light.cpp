@@ -32,7 +32,7 @@ struct Placement {
 Placement placement_of(int width, int height, Orientation orientation) {
   const int o = static_cast<int>(orientation);
   const bool transposed = o >= 5;
-  const bool flip_x = o == 2 || o == 3 || o == 7 || o == 8;  // of the stored image
+  const bool flip_x = o == 2 || o == 3 || o == 7 || o == 8;  // horizontal flip of the stored image
   const bool flip_y = o == 3 || o == 4 || o == 6 || o == 7;
   Placement p;
   p.width = transposed ? height : width;

@@ -20,6 +20,7 @@ enum class CompletionState : std::uint8_t {
   cancelled  // not filled: the stream ends
 };
 
+/// Describes a completed request of libcamera.
 struct Completion {
   int buffer = 0;
   CompletionState state = CompletionState::filled;

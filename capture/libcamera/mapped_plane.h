@@ -37,7 +37,7 @@ class MappedPlane {
   MappedPlane() = default;
 
   int fd_ = -1;
-  const std::byte* start_ = nullptr;  // of the mapping, which starts at the start of the buffer
+  const std::byte* start_ = nullptr;  // start of the mapping, and of the buffer
   std::size_t mapped_bytes_ = 0;
   std::size_t offset_ = 0;
 };

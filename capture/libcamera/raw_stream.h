@@ -12,6 +12,7 @@
 
 namespace lowlux::capture {
 
+/// Holds the size of a frame in pixels.
 struct FrameSize {
   int width = 0;
   int height = 0;
@@ -50,7 +51,7 @@ struct AgreedStream {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::uint32_t stride_bytes = 0;
-  std::uint32_t frame_bytes = 0;  // of one buffer
+  std::uint32_t frame_bytes = 0;  // bytes of one buffer
   std::uint32_t buffers = 0;
 };
 

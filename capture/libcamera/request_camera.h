@@ -71,7 +71,7 @@ class RequestCamera final : public Camera {
   OpenRequestDevice open_;
   bool streaming_ = false;
   int failed_ = 0;                                             // the errno with which a buffer was rejected
-  std::optional<std::uint32_t> last_sequence_;                 // of this stream
+  std::optional<std::uint32_t> last_sequence_;                 // last sequence number of this stream
   std::vector<std::optional<std::chrono::nanoseconds>> lent_;  // by buffer: the timestamp of the lent frame
 };
 

@@ -86,7 +86,7 @@ struct MovedSums {
   double variance = 0, squares_by_signal = 0, counts_by_signal = 0, counts_by_contrast = 0;
 
   /// @param before_e, after_e mean charge of a pixel without and with the effects
-  /// @param mean_e            of all pixels with them
+  /// @param mean_e            mean of all pixels with them
   /// @param step_e            charge of a code
   void take(double before_e, double after_e, double mean_e, double step_e) {
     const double more = after_e - before_e, off = after_e - mean_e;
@@ -105,7 +105,7 @@ struct MovedSums {
 };
 
 /// Returns what effects add that turn the rates `before` of a block to those with all effects.
-/// @param mean_e of R, G and B pixels with them
+/// @param mean_e mean of R, G and B pixels with them
 isp::MovedLight moved_light(const SensorFrame& frame, const BlockArea& area, std::span<const float> RowRates::*before,
                             const Vector3& mean_e) {
   std::array<MovedSums, 3> sums;

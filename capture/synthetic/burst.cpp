@@ -23,7 +23,7 @@ struct BurstView {
   const LightGrid* foreground = nullptr;  // null: all is sky
   double horizon_px = 0;                  // first row of the foreground
   RigidMotion sky_motion;                 // from frame 0 to this frame
-  RigidMotion camera_motion;              // of the foreground and the moving objects
+  RigidMotion camera_motion;              // motion of the foreground and of the moving objects
   std::span<const Mover> movers;          // later ones are in front
   std::uint32_t frame = 0;
 };

@@ -24,8 +24,8 @@ namespace lowlux::capture {
 
 /// Holds the true motion and content of one frame of a burst.
 struct BurstTruth {
-  RigidMotion motion;         // of the scene from frame 0 to this frame; with a horizon, of the sky above it
-  RigidMotion camera_motion;  // of the foreground and of what moving objects are measured against
+  RigidMotion motion;         // motion of the scene from frame 0 to this frame; with a horizon, of the sky above it
+  RigidMotion camera_motion;  // motion of the foreground, and the origin of the motion of objects
   double exposure_s = 0;
   std::vector<ImageBox> movers;  // in the coordinates of frame 0, not cut to the image
 };

@@ -23,7 +23,7 @@ struct BurstOptions {
 
   /// Rotation and displacement of the sky from one frame to the next, before the motion of the camera.
   double field_rotation_deg = 0;           // -180..180
-  std::optional<ImagePoint> field_centre;  // of that rotation; absent: centre of the image
+  std::optional<ImagePoint> field_centre;  // centre of that rotation; absent: centre of the image
   double drift_x_px = 0, drift_y_px = 0;   // -4096..4096
   /// First row of the foreground in frame 0: it hides the sky and does not move with it. Absent: all is sky.
   std::optional<int> horizon_px;

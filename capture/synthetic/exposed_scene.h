@@ -29,7 +29,7 @@ struct ChargeRate {
 };
 
 /// Computes patches and points by the integrals of their spectra, lifted colours by the table.
-/// @param table of the response; may be null for a scene of patches
+/// @param table table of the response; may be null for a scene of patches
 ChargeRate charge_rate(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table,
                        BayerPhase phase, Executor& executor);
 

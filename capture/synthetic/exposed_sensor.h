@@ -21,7 +21,7 @@ namespace lowlux::capture {
 class ExposedSensor {
  public:
   /// Plans the noise sources of an exposure.
-  /// @param light of the image, without the masked columns
+  /// @param light light of the image, without the masked columns
   /// Errors: a mean charge beyond the sampler's limit without a full well to bound it.
   static Result<ExposedSensor> of(SyntheticCamera camera, SensorLight light);
 

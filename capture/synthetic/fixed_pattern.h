@@ -21,7 +21,7 @@ void apply_prnu(const PatternRow& row, float deviation, std::span<float> values,
 void apply_dsnu(const PatternRow& row, float deviation, std::span<float> values, std::span<float> scratch);
 
 /// Adds the charge of hot pixels: a fraction `fraction` of all, each with an exponentially distributed charge.
-/// @param mean_e of a hot pixel's extra charge
+/// @param mean_e mean of a hot pixel's extra charge
 void add_hot_pixels(const PatternRow& row, double fraction, double mean_e, std::span<float> charge_e,
                     std::span<std::uint32_t> scratch);
 

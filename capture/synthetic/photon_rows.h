@@ -23,7 +23,7 @@ enum class PhotonSampling : std::uint8_t { physical, published };
 /// reproduce the thesis; it needs about a hundred draws for each pixel instead of one.
 class PhotonRows {
  public:
-  /// @param table          of the response; may be null for a scene of patches
+  /// @param table          table of the response; may be null for a scene of patches
   /// @param masked_columns dark columns of the sensor left of the scene
   PhotonRows(const Scene& scene, const SpectralResponse& response, const isp::LiftTable* table, BayerPhase phase,
              int masked_columns);

@@ -24,7 +24,7 @@ struct SensorFrame {
   std::uint64_t pattern_seed = 0;       // seed of the fixed pattern: PRNU, DSNU, hot pixels, columns
   std::uint32_t frame = 0;
   int masked_columns = 0;                       // at the left: light-shielded, without crosstalk
-  PlaneView<const float> blurred_e_per_s = {};  // as large, with the blur of the lens; empty: it has none
+  PlaneView<const float> blurred_e_per_s = {};  // rates with the blur of the lens, of equal size; empty: without blur
 
   bool has_lens_blur() const { return blurred_e_per_s.data != nullptr; }
 };

@@ -21,6 +21,7 @@ struct NoiseSourceChoice {
   isp::NoiseSourceSet effects = isp::NoiseSourceSet::all();  // used without a tolerance
 };
 
+/// Holds the options of a simulated camera.
 struct SyntheticOptions {
   isp::Exposure exposure;
   double f_number = 2;

@@ -16,7 +16,7 @@ struct V4l2Taken {
   std::uint32_t flags = 0;
   std::uint32_t sequence = 0;
   std::uint32_t bytes_used = 0;
-  std::uint32_t data_offset = 0;  // of the frame in the buffer; 0 with one plane of memory
+  std::uint32_t data_offset = 0;  // data offset of the frame in the buffer; 0 with one plane of memory
   std::int64_t seconds = 0;
   std::int64_t microseconds = 0;
 };
@@ -52,7 +52,7 @@ class V4l2Buffers {
   struct Buffer {
     const std::byte* at = nullptr;
     std::size_t bytes = 0;
-    int file = -1;  // of the DMA buffer
+    int file = -1;  // file descriptor of the DMA buffer
     bool queued = false;
     bool accessed = false;  // begin_access was called without end_access
   };

@@ -83,6 +83,7 @@ enum class V4l2Memory : std::uint8_t {
   dma_buf  // the buffers are exported as DMA buffers (VIDIOC_EXPBUF), mapped, and synchronised around each use
 };
 
+/// Holds the options of open_v4l2().
 struct V4l2Options {
   CameraRequest request;
   V4l2Memory memory = V4l2Memory::mmap;

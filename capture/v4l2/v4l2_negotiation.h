@@ -30,6 +30,7 @@ Result<V4l2Layout> read_layout(V4l2Device& device);
 /// response, which may differ in every respect.
 Result<V4l2Layout> set_layout(V4l2Device& device, std::uint32_t fourcc, std::uint32_t width, std::uint32_t height);
 
+/// Holds the size of a frame in pixels.
 struct V4l2Size {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
@@ -56,9 +57,10 @@ std::string sizes_text(const V4l2Sizes& sizes);
 /// Returns "SRGGB10 640x480 1280x720" for each raw format.
 std::vector<std::string> raw_offers_text(V4l2Device& device);
 
+/// Holds the format and the layout on which lowlux and the driver agreed.
 struct V4l2Agreement {
   CameraFormat format;
-  V4l2Layout layout;                  // as the driver reported it; checked
+  V4l2Layout layout;                  // layout that the driver reported; checked
   std::vector<std::string> warnings;  // deviations from the expected layout
 };
 

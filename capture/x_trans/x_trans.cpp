@@ -30,7 +30,7 @@ struct Continued {
   PlaneView<const float> mosaic;
   const XTransSetting& setting;
   std::array<float, 3> scale;  // by which samples of each colour are multiplied
-  float mean;                  // of all samples, scaled: what a colour without any site gets
+  float mean;                  // mean of all samples, scaled: what a colour without any site gets
 
   std::size_t colour(int x, int y) const { return static_cast<std::size_t>(colour_at(setting.phase, x, y)); }
 
@@ -87,7 +87,7 @@ constexpr int rows_used_of_all = 1200;          // rows of blocks; of larger mos
 /// A group of blocks of similar brightness.
 struct Level {
   std::vector<float> difference;  // absolute value
-  double sum = 0;                 // of the means
+  double sum = 0;                 // sum of the means
 };
 
 bool is_green_block(const XTransPhase& phase, int x, int y) {

@@ -8,7 +8,7 @@
 namespace lowlux::capture::x_trans {
 
 inline constexpr int period = x_trans_period;
-inline constexpr int lanes = 8;                                             // of a row of a filter, the last is 0
+inline constexpr int lanes = 8;                                             // taps in a row of a filter, the last is 0
 inline constexpr std::array<float, 3> luma_weights{0.25F, 0.5F, 0.25F};     // of R, G, B
 inline constexpr std::array<float, 9> triangle{1, 2, 3, 4, 5, 4, 3, 2, 1};  // weights of local means, along each axis
 

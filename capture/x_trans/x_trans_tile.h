@@ -17,7 +17,7 @@ using Base = std::array<float, terms>;  // weights of the terms
 using PlacedFilters = std::array<PlacedFilter, terms>;
 
 inline constexpr int core = 128;   // side of the region that a tile computes
-inline constexpr int margin = 12;  // of sites around it that are read
+inline constexpr int margin = 12;  // number of sites around it that are read
 inline constexpr int padded = core + 2 * margin;
 
 /// Interpolates one tile. Memory is allocated once, by the constructor.
@@ -70,7 +70,7 @@ class Tile {
   float ratio_floor_ = 0, root_offset_ = 0, knee_ = 0;
   float least_value_ = 0;                                         // that noise explains where it is dark
   bool is_compressed_ = false;                                    // the tile that is run
-  std::array<std::size_t, padded> row_sites_{}, column_sites_{};  // whose sum is the number of a site
+  std::array<std::size_t, padded> row_sites_{}, column_sites_{};  // offsets whose sum is the index of a site
   Plane<float> samples_, luma_, compressed_;
   std::array<Plane<float>, 3> ratio_;     // by which samples of each colour are divided around a site
   std::array<Plane<float>, 4> row_sums_;  // scratch

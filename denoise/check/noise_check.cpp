@@ -65,7 +65,7 @@ struct Check {
   std::optional<BlockDetail> detail(int x0, int y0, int level) const;
   /// Returns the noise ratio of a square of `side` cells of a level of the tile.
   double ratio_of(int x0, int y0, int side, int level) const {
-    const int px = 2 << level;  // of a cell
+    const int px = 2 << level;  // side of a cell in pixels
     return raw.noise_ratio.mean(2 * tile_x + px * x0, 2 * tile_y + px * y0, px * side, px * side);
   }
   void halve(int columns, int rows);
@@ -101,7 +101,7 @@ void Check::load(int x0, int y0, int columns, int rows) {
 }
 
 void Check::add_window(int x0, int y0) {
-  std::array<double, 3> deviations{};  // of the mean signal from 0, in standard deviations
+  std::array<double, 3> deviations{};  // deviation of the mean signal from 0, in standard deviations
   const double ratio = ratio_of(x0, y0, window, 0);
   for (int c = 0; c < 3; ++c) {
     double sum = 0, squares = 0;

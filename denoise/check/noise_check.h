@@ -48,6 +48,7 @@ inline constexpr double largest_ratio = 1.5;
 /// scale is the mean of both, at least 0.01, where that is below min_ratio; else 1, also where nothing was measured.
 std::array<double, max_levels> variance_scale_of(const NoiseCheck& check);
 
+/// Lists the contradictions between a frame and its noise model.
 enum class NoiseFinding : std::uint8_t {
   black_suspicious,   // more than 1 % of the windows of a colour are below 0
   noise_below_model,  // on some level, below min_ratio: denoised or compressed before, or the gain is too low
@@ -56,6 +57,7 @@ enum class NoiseFinding : std::uint8_t {
   all_saturated,      // more than 99 % of sites are saturated
 };
 
+/// Holds a contradiction between a frame and its noise model, with a text for the user.
 struct NoiseRemark {
   NoiseFinding finding;
   std::string text;  // cause and suggestion, to follow "the raw: " or a similar prefix

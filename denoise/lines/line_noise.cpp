@@ -43,8 +43,8 @@ double robust_std(std::vector<double> values) {
 
 /// Scatter between neighbouring lines of the same colours.
 struct Scatter {
-  double group_variance_e2 = 0;  // of one group's mean about the line's common offset
-  double line_variance_e2 = 0;   // of the line's common offset, as measured by medians: V + e^2
+  double group_variance_e2 = 0;  // variance of one group's mean about the line's common offset
+  double line_variance_e2 = 0;   // variance of the line's common offset, as measured by medians: V + e^2
   double groups_used = 0;
   double unevenness = 0;  // see LineOffsets
 };

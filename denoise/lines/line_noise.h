@@ -38,6 +38,7 @@ struct LineOffsets {
 /// @return an error unless there are 16 lines of 4 pixels, with values in most of them
 Result<LineOffsets> line_offsets_of_masked(PlaneView<const float> masked_e, Lines lines);
 
+/// Holds the options of line_offsets_of_frame().
 struct FrameLineOptions {
   std::optional<double> known_std_e;  // calibrated line noise, >= 0; absent: measured, so that blinds look like noise
   int reach = 8;                      // lines of the same colours to either side that a line is compared with, 1 to 64
@@ -63,7 +64,8 @@ Result<LineOffsets> line_offsets_of_frame(PlaneView<const float> charge_e, Lines
 /// @param first  number of the crop's first line
 void subtract_lines(const LineOffsets& offsets, PlaneView<float> charge_e, int first = 0);
 
-inline constexpr int segments = 8;  // of a line, each in two groups: even and odd positions, whose colours differ
+inline constexpr int segments =
+    8;  // segments of a line, each in two groups: even and odd positions, whose colours differ
 inline constexpr int groups = 2 * segments;
 
 /// Returns the means of the groups of pixels of every line: as wide as there are lines, `groups` high. NaN for a group

@@ -28,7 +28,7 @@ isp::Xy resaturate_xy(const isp::Xy& measured, const isp::Xy& dark, double alpha
 /// Known properties of a finished image in which dark current was left. For raw data prefer subtract_dark().
 struct Resaturation {
   isp::Xyz dark;                            // the black point, in the image's unit; X + Y + Z >= 0
-  isp::Xy neutral = isp::white_d65;         // of the image; inside the gamut
+  isp::Xy neutral = isp::white_d65;         // neutral of the image; inside the gamut
   double chroma_noise = 0;                  // std of X - x0 S and of Y - y0 S of a pixel, in the image's unit, >= 0
   double prior_std = 0.065;                 // sigma_p of x and of y, natural scenes: 0.04 in u'v' times 0.34 / 0.21
   int radius = 4;                           // alpha is that of the mean over (2 radius + 1)^2 pixels, 0..64
@@ -47,7 +47,7 @@ void resaturate(const RgbView<const float>& in, const Resaturation& how, const R
 
 /// Subtracts the mean dark charge from a mosaic, y - d, and keeps the sign: values below zero are data, and clipping
 /// them would lift dark means by 0.4 standard deviations. In linear data this inverts Eq. 4.23 completely.
-/// @param dark_e  of the four sites of the mosaic [e-]
+/// @param dark_e  dark of the four sites of the mosaic [e-]
 void subtract_dark(PlaneView<const float> charge_e, const PerSite<double>& dark_e, PlaneView<float> signal_e);
 
 /// Subtracts the mean dark charge from a mosaic in its own memory, and keeps the sign.

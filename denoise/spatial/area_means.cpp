@@ -21,7 +21,7 @@ constexpr double most_sigma = 5;     // of a difference that is noise
 /// Sums over the sites of one colour in a square.
 struct SiteSums {
   double inverse_variance = 0;
-  int seen = 0;  // of those, whether they count or not
+  int seen = 0;  // number of all of them, whether they count or not
   double missing_e = 0;
   double variance_e2 = 0;
   int counted = 0;

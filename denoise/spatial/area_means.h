@@ -19,7 +19,7 @@ namespace lowlux::denoise {
 struct MeansFrame {
   const RawElectronsView& raw;
   const RawNoise& noise;
-  double variance_scale;                    // of the noise of a mean over a square
+  double variance_scale;                    // factor of the noise variance of a mean over a square
   std::array<double, 3> white_gain;         // R, G, B
   std::array<double, 3> dark_e;             // R, G, B
   std::array<float, 3> min_e;               // least raw means that variances are computed of

@@ -23,7 +23,7 @@ Place place_of(int i, int grid, int tiles) {
 
 /// Returns the first cell of level `grid` at or beyond the centre of a tile.
 int next_centre(int column, int grid) {
-  const int cells = tile >> grid;  // of a tile: a power of two
+  const int cells = tile >> grid;  // cells of a tile: a power of two
   return column * cells + cells / 2;
 }
 

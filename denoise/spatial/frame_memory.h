@@ -27,7 +27,7 @@ struct PlaneSet {
 
 /// One pyramid level. `variance` and `residual` have half its width and height.
 struct PyramidLevel {
-  int width = 0;  // of the current frame
+  int width = 0;  // width of the current frame
   int height = 0;
   PlaneSet noisy;
   PlaneSet value[2];  // results of pass 1 and of pass 2
@@ -42,15 +42,15 @@ struct FrontMemory {
   std::array<float*, 2> raw{};                     // raw samples
   std::array<std::array<float*, 16>, 3> window{};  // R, G, B with dark charge, last 16 rows
   float* saturated = nullptr;
-  float* ratio = nullptr;  // of half width
+  float* ratio = nullptr;  // noise ratio, one value for two columns
   rows::RowScratch variance{};
 };
 
 /// Block sums of one thread.
 struct BlockMemory {
   Scratch scratch;
-  std::array<std::array<float*, 8>, 4> value{};   // of 8 rows
-  std::array<std::array<float*, 4>, 4> weight{};  // of 4 rows of half width
+  std::array<std::array<float*, 8>, 4> value{};   // 8 rows
+  std::array<std::array<float*, 4>, 4> weight{};  // 4 rows of half width
   std::array<std::array<float*, 4>, 4> residual{};
   rows::RowScratch weights{};  // one row
   rows::RowScratch blocks{};
@@ -73,7 +73,7 @@ struct UnpackMemory {
   float* removed = nullptr;
   float* seen = nullptr;
   std::array<float*, 2> signal{};  // raw samples
-  float* ratio = nullptr;          // of raw samples
+  float* ratio = nullptr;          // noise ratio of raw samples
   float* confidence = nullptr;
 };
 
@@ -111,7 +111,7 @@ struct FrameLayout {
   int columns;  // cells of the largest frame
   int rows;
   std::array<PyramidLevel, max_levels> level{};
-  PlaneSet difference;  // of the size of level 1
+  PlaneSet difference;  // difference image, of the size of level 1
   std::vector<ThreadMemory> thread;
   std::vector<SearchMemory> search;  // one for each thread
   std::vector<PatchMemory> patches;  // one for each thread, or empty

@@ -24,8 +24,8 @@ struct ResidualOfPatches {
 struct PatchRow {
   const float* noisy[4];  // row 0 of L, C1, C2, C3
   const float* pilot[4];
-  std::ptrdiff_t stride;     // of both `noisy` and `pilot`
-  const float* variance[4];  // of half width and height, a quarter of the mean over 2x2 cells
+  std::ptrdiff_t stride;     // stride of `noisy` and of `pilot`
+  const float* variance[4];  // variance planes of half width and height: a quarter of the mean over 2x2 cells
   std::ptrdiff_t variance_stride;
   int width;  // cells, a multiple of 4, as is `height`
   int height;

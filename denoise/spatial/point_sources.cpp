@@ -23,7 +23,7 @@ double max_spread(double variance_e2) { return ring_windows + 5 * std::sqrt(ring
 struct Search {
   PlaneView<const float> raw;
   double floor_e;      // smallest mean of a window
-  double variance_e2;  // of a window, in addition to its mean
+  double variance_e2;  // variance of a window, in addition to its mean
   NoiseRatioView ratio{};
 
   double value(int x, int y) const {

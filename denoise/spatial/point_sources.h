@@ -25,11 +25,11 @@ inline constexpr int source_margin = 6;
 
 /// Search memory of one thread.
 struct SearchMemory {
-  Scratch scratch;                // of the rows below
+  Scratch scratch;                // scratch memory of the rows below
   std::array<float*, 14> pair{};  // sums of two rows; each as long as a row and its padding
   std::array<float*, 2> sums{};
-  float* ratio = nullptr;         // as long as a row and its padding
-  std::int32_t* found = nullptr;  // as long as the frame is wide
+  float* ratio = nullptr;         // length: a row and its padding
+  std::int32_t* found = nullptr;  // length: the width of the frame
 };
 
 /// Sets cells[x, y] to 1 where the 2x2 cell holds a part of a point source, to 0 elsewhere. A source is a 2x2 window of

@@ -15,7 +15,7 @@ namespace lowlux::denoise {
 struct ResidualShares {
   float kept;
   float other;
-  float mean;  // of the block's mean, on the coarsest level: 1/64 less what overlapping blocks average out
+  float mean;  // fraction for the mean of the block on the coarsest level: 1/64, reduced by overlapping blocks
 };
 
 enum class PlaneKind : unsigned char { luma, chroma };

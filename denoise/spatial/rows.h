@@ -35,7 +35,7 @@ struct PackRow {
   float dark_e[3];  // R, G, B
   float gain[3];
   float saturation_e[3];
-  float offset_e;  // of the stabiliser
+  float offset_e;  // offset of the stabiliser
 };
 struct PackedRow {
   float* raw_e[3];   // R, mean of both greens, B, dark charge included, as measured
@@ -52,9 +52,9 @@ struct VarianceRow {
   float min_e[3];  // floor of the local mean
   float dark_e[3];
   float variance_e2[3];
-  float gain[3];       // of the noise: that of white balance and the root of the variance's scale
-  float balance[3];    // of white balance
-  float offset_e;      // of the stabiliser
+  float gain[3];       // gain of the noise: white balance times the root of the variance's scale
+  float balance[3];    // gain of white balance
+  float offset_e;      // offset of the stabiliser
   const float* ratio;  // factor of each variance of the row; null: 1, and nothing below is read
   float most_ratio;    // of the frame
   float* plane[3][2];  // L, C1, C2 of the two rows of cells, whose means become those of noise of the largest ratio
@@ -100,8 +100,8 @@ struct ResidualOfBlocks {
 struct BlockRow {
   const float* noisy[4];     // L, C1, C2, C3
   const float* pilot[4];     // result of pass 0; null: hard thresholds
-  std::ptrdiff_t stride;     // of both `noisy` and `pilot`
-  const float* variance[4];  // of half width and height
+  std::ptrdiff_t stride;     // stride of `noisy` and of `pilot`
+  const float* variance[4];  // variance of half width and height
   std::ptrdiff_t variance_stride;
   int blocks;
   int step;                    // cells from one block to the next, 2 or 4
@@ -155,7 +155,7 @@ struct UnpackRow {
   bool red_is_odd;
   const float* luma_beside[2];  // rows above and below
   Slopes slopes;
-  float offset_e;  // of the stabiliser
+  float offset_e;  // offset of the stabiliser
   float dark_e[3];
   float min_e[3];  // floor of the raw mean
   float variance_e2[3];
@@ -164,8 +164,8 @@ struct UnpackRow {
 struct UnpackedRow {
   float* signal_e[2];  // the row with red, the row with blue
   float* confidence;
-  float* luma_variance_e2;  // of white-balanced luma; may be the row of its residual, and those below of the others
-  float* variance_e2[3];    // of sites of R, G, B
+  float* luma_variance_e2;  // variance of white-balanced luma; these rows may be those of the residuals
+  float* variance_e2[3];    // variance of sites of R, G, B
 };
 void unpack_row(const UnpackRow& in, const UnpackedRow& out);
 

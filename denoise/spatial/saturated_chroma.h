@@ -10,7 +10,7 @@ namespace lowlux::denoise {
 /// ... cells that holds one, bilinear between them. Cells without a valid cell on the coarsest level are interpolated
 /// linearly along its rows, then from row to row; 0 where no cell is valid at all. Does nothing if no cell is
 /// saturated.
-/// @param levels  of the current frame. PyramidLevel::value is overwritten.
+/// @param levels  number of levels of the current frame. PyramidLevel::value is overwritten.
 void fill_saturated_chroma(const FrameMemory& memory, int levels, const Workers& workers);
 
 }  // namespace lowlux::denoise

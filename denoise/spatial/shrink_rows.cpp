@@ -22,8 +22,8 @@ namespace lowlux::denoise::rows::HWY_NAMESPACE {
 struct RowMemory {
   Strip* strip;
   float* cells;     // one row of half width
-  float* variance;  // of each block
-  float* weight;    // of each block
+  float* variance;  // variance of each block
+  float* weight;    // weights of each block
   float* residual;  // weight times remaining variance
 };
 

@@ -125,7 +125,7 @@ HWY_INLINE VF wiener_gain(VF power, VF variance) { return hn::Div(power, hn::Add
 /// together they have more power than noise has: texture, or the edges of faint colours. Its spectrum is taken as
 /// A / sqrt(u^2 + v^2), with A measured in each block (denoise/README.md, "Faint signal").
 struct FaintSignal {
-  float factor;  // of the excess beyond the margin
+  float factor;  // factor of the excess beyond the margin
   float margin;  // standard errors of the excess in pure noise
 };
 
@@ -174,8 +174,8 @@ struct Coefficients {
 /// Sums over the coefficients below their thresholds. To be initialised with zeros: constructors are not compiled for
 /// every instruction set.
 struct SumsBelow {
-  VF excess;  // of shape (F^2 - noise that is below too)
-  VF shape2;  // of shape^2
+  VF excess;  // excess of the shape: F^2 minus the noise, which may be negative
+  VF shape2;  // squared shape
 
   /// @param noise  the mean square of noise of which only what is below the threshold counts
   HWY_INLINE void add(int i, hn::Mask<Floats> below, VF square, VF noise) {

@@ -17,7 +17,7 @@ namespace lowlux::denoise {
 /// only in the constructor; the results are the same for every number of threads and every instruction set.
 class FrameMotion {
  public:
-  static constexpr int min_side = 64;                // of frames, in sites; smaller ones are not searched
+  static constexpr int min_side = 64;                // smallest side of frames, in sites; smaller ones are not searched
   static constexpr float no_content = 1e6f;          // relative variance of a block that no previous frame shows
   static constexpr int tile = 2 * rows::tile_cells;  // sites of a side
 
@@ -62,13 +62,13 @@ class FrameMotion {
   };
 
   Plane<std::int16_t> frame_, mean_;                // stabilised cells
-  Plane<std::int16_t> coarse_frame_, coarse_mean_;  // of 4 x 4 cells, with the noise of one
+  Plane<std::int16_t> coarse_frame_, coarse_mean_;  // means of 4 x 4 cells, scaled to the noise of one cell
   Plane<Displacement> of_tile_, of_tile_before_;    // in cells, as below
   Plane<Displacement> of_block_;
   Plane<rows::BlockSlopes> slopes_;
   Plane<Residual> residual_;
-  std::vector<double> cost_;      // of each displacement of the whole frame
-  std::vector<double> mismatch_;  // of each row of tiles: sum over blocks of the relative variance that was added
+  std::vector<double> cost_;      // cost of each displacement of the whole frame
+  std::vector<double> mismatch_;  // sum of the relative variance added to the blocks, for each row of tiles
   bool found_ = false;
 };
 

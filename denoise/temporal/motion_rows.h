@@ -8,16 +8,16 @@
 namespace lowlux::denoise::rows {
 
 inline constexpr int units_per_sigma = 4;  // standard deviation of the noise of a stabilised cell
-inline constexpr int max_difference = 64;  // of two cells, that counts [units]
-inline constexpr int tile_cells = 16;      // of a side of a tile
-inline constexpr int block_cells = 4;      // of a side of a block of 8 x 8 sites
+inline constexpr int max_difference = 64;  // largest difference of two cells that counts [units]
+inline constexpr int tile_cells = 16;      // side of a tile
+inline constexpr int block_cells = 4;      // side of a block of 8 x 8 sites
 
 /// Two rows of a mosaic.
 struct StabiliseRow {
   const float* upper;
   const float* lower;
   int cells;
-  float dark_e[4];  // that the sites contain, as in site_of()
+  float dark_e[4];  // dark charge of the sites, in the order of site_of()
   float offset_e2;  // sum of the variances of the four sites without light, > 0
 };
 /// Writes 2 units_per_sigma sqrt(S + offset_e2) for each cell, with S the sum of the signals of its sites: noise of the

@@ -101,9 +101,9 @@ struct Memory {
   int max_width;
   int max_height;
   Plane<float> mean_e;  // without dark charge
-  Plane<float> share;   // of each block: ratio of the variance of the mean to that of a raw value
+  Plane<float> share;   // variance of the mean over that of a raw value, for each block
   Plane<std::uint8_t> moved;
-  Plane<AreaSums> steps;  // of area_step blocks side by side
+  Plane<AreaSums> steps;  // areas of area_step blocks side by side
   Plane<float> offset;    // of each area: mean square of its difference from the mean, over the variance of raw values
   Plane<float> step_of_site;  // of R, G, B: mean difference over its variance, of areas that do not overlap
   FrameMotion motion;
@@ -113,7 +113,7 @@ struct Memory {
   std::vector<StripMemory> strip;  // one for each thread
   std::vector<long long> count;    // number of blocks that moved, for each thread
   bool empty = true;
-  int width = 0;  // of the previous frame
+  int width = 0;  // width of the previous frame
   int height = 0;
   BayerPhase phase = BayerPhase::rggb;
   rows::SiteNoise noise{};
@@ -191,7 +191,7 @@ std::array<const float*, motion_block> Frame::before_rows(int x, int y, StripMem
 /// Returns the mean's variance over that of a raw value after a change of light or noise: the ratio changes by light^2
 /// times the raw value's variance before, over that now. Both come from the block's mean of each colour: a site's own
 /// value would make the weights of values depend on their noise.
-/// @param sums  of the block's columns over even and odd rows, in the light of this frame
+/// @param sums  sums of the block's columns over even and odd rows, in the light of this frame
 double Frame::fraction_now(double share, const std::array<const float*, 2>& sums, int width, int height) const {
   std::array<double, 3> sum{}, count{};
   for (int y = 0; y < 2; ++y) {

@@ -8,6 +8,7 @@
 
 namespace lowlux::denoise {
 
+/// Holds the options of TemporalMean.
 struct TemporalOptions {
   double false_alarm = 1e-3;      // fraction of blocks of a still scene that are detected as moving, 1e-6..0.5
   int max_frames = 32;            // 2..256: the newest frame has a weight of at least 1 / max_frames
@@ -41,7 +42,7 @@ class TemporalMean {
   /// Adds a frame to the mean. If its size or phase differs from that of the previous frame, it is the first, as after
   /// reset().
   /// @param raw  at least 2 x 2 pixels; any phase, odd sizes too; without a noise ratio
-  /// @param noise  of this frame; the dark charge and the variance may change from frame to frame
+  /// @param noise  noise of this frame; the dark charge and the variance may change from frame to frame
   /// @param light  ratio of the signal [e-] of a scene in this frame to that in the previous frame: the ratio of
   /// exposure times, where only they change. > 0 and finite; beyond 1e-6..1e6 the frame is the first
   /// @param mean_e  as large as `raw`: the mean scaled to this frame's light, with this frame's dark charge in it, as

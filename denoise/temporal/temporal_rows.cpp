@@ -146,7 +146,7 @@ struct Statistics {
   VF step;
   VF step_mean;
   VF step_variance;
-  VF change[3];  // of R, G, B: sum of the differences over their variances without that of the mean
+  VF change[3];  // sum of the differences over their variances without that of the mean, for R, G, B
   VF weight[3];  // and the variance of this sum, in the same way
   VF count[3];   // and the number of its sites
 };

@@ -29,7 +29,7 @@ struct Threshold {
 /// Input of one strip: its rows, in each pair the row with red first. All may be read over the full length of a strip.
 struct MotionStrip {
   const float* raw[motion_block];
-  const float* mean_e[motion_block];  // of the previous frames, in the light of this one, without dark charge
+  const float* mean_e[motion_block];  // mean of the previous frames, in the light of this one, without dark charge
   bool inside[motion_block];          // whether the frame has the row
   int width;                          // sites of the strip that the frame has
   bool red_is_odd;
@@ -58,7 +58,7 @@ struct ScaleStrip {
   float saturation_e[4];  // without dark charge, of sites as in site_of()
 };
 /// Scales a mean to a change of light.
-/// @param sums  of the columns, over even rows and over odd ones, after scaling
+/// @param sums  sums of the columns, over even rows and over odd ones, after scaling
 void scale_mean(const ScaleStrip& in, float (*sums)[sites_of_strip]);
 
 /// The rows of a strip to be updated, in their order.
@@ -68,9 +68,9 @@ struct UpdateStrip {
   float* mean_e[motion_block];          // the new mean; may be before_e
   float* out[motion_block];             // the new mean, with dark charge
   int rows;
-  float dark_e[4];        // of sites as in site_of()
+  float dark_e[4];        // dark charge of the sites, in the order of site_of()
   float saturation_e[4];  // without dark charge
-  const float* weight;    // of the newest frame, for each block; 1 if it moved
+  const float* weight;    // weights of the newest frame, for each block; 1 if it moved
 };
 void update_mean(const UpdateStrip& in);
 

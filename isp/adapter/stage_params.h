@@ -26,7 +26,7 @@ struct StageFacts {
 /// Describes the stream for which the facts are made.
 struct StageStream {
   RawFormat format;
-  BayerPhase phase = BayerPhase::rggb;  // of the active area
+  BayerPhase phase = BayerPhase::rggb;  // phase of the active area
   denoise::Level most = denoise::Level::draft;
   bool has_level = true;  // memory for a level is allocated
   bool has_masked = false;

@@ -53,7 +53,7 @@ struct MeasuredRange {
 
 /// Describes a camera at one gain setting.
 struct GainProfile {
-  std::string gain_setting;  // as the camera names it
+  std::string gain_setting;  // name that the camera uses
   std::optional<double> iso;
   std::optional<SensorModel> sensor;  // absent where the system gain is unknown: then no figure is in electrons
   SensorErrors errors;

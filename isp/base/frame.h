@@ -17,6 +17,7 @@
 
 namespace lowlux {
 
+/// Holds a rectangle of pixels: x and y of its upper left pixel, and its size.
 struct Rect {
   int x = 0;
   int y = 0;
@@ -49,7 +50,7 @@ struct FrameInfo {
   std::string make;
   std::string model;
   std::string software;
-  std::string date_time;  // as the source writes it, "YYYY:MM:DD hh:mm:ss"
+  std::string date_time;  // text of the source, "YYYY:MM:DD hh:mm:ss"
   std::optional<double> exposure_s;
   std::optional<double> iso;
   std::optional<double> f_number;

@@ -12,6 +12,7 @@ namespace lowlux {
 template <class T>
 using RgbView = std::array<PlaneView<T>, 3>;
 
+/// Holds three planes of equal size; the domain states what their values are.
 template <class Domain>
 struct RgbPlanes {
   std::array<Plane<float>, 3> plane;

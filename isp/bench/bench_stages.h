@@ -58,10 +58,11 @@ struct BenchOutcome {
   std::vector<std::string> remarks;  // how it was measured, and what was left out; one line each
   std::vector<BenchComparison> comparisons = {};
   int threads = 1;                          // number used by the timed work, where the table has no such column
-  std::vector<BenchSetting> settings = {};  // what is needed to repeat it, where the stage has options of its own
+  std::vector<BenchSetting> settings = {};  // settings to repeat it, for stages with additional options
   std::vector<Error> failures = {};         // parts of the work that failed, and are left out
 };
 
+/// Holds the options of all stages.
 struct BenchOptions {
   std::string pictures_folder;  // folder of testdata/pictures
   PictureSet pictures = PictureSet::held_out;
@@ -69,10 +70,10 @@ struct BenchOptions {
   int threads = 1;                                                     // for all work that is not timed
   const NlMeans* nl_means = nullptr;                                   // compared method; absent: its row is left out
   std::string why_no_nl_means;                                         // reason why nl_means is absent
-  std::vector<ScoredMethod> methods;                                   // of the stage `methods`
+  std::vector<ScoredMethod> methods;                                   // methods of the stage `methods`
   CommandLimits command_limits;                                        // of each run of a method's command
-  std::uint64_t seed = 1;                                              // of the stage `methods`
-  Shard shard;                                                         // of the lights of the stage `methods`
+  std::uint64_t seed = 1;                                              // seed of the stage `methods`
+  Shard shard;                                                         // shard of the lights of the stage `methods`
   std::function<void(double share, const std::string& what)> advance;  // adds to the fraction done; from any thread
 };
 

@@ -15,7 +15,7 @@ namespace lowlux::isp {
 /// difference from the one `predictor_step` samples before (TIFF 6.0, section 14).
 class CodeRows {
  public:
-  /// @param row_samples  of a strip or tile, at least 1
+  /// @param row_samples  samples of a row of a strip or tile, at least 1
   CodeRows(const RowStorage& storage, std::size_t row_samples);
 
   /// Returns the bytes of a row.

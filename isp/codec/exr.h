@@ -10,6 +10,7 @@
 
 namespace lowlux::isp {
 
+/// Holds the options of encode_exr().
 struct ExrOptions {
   /// Half keeps 11 significant bits (1 part in 2048) from 6.1e-5 to 65504 and clamps larger values to +-65504: finer
   /// than the noise of any camera. Full keeps every float unchanged.

@@ -16,7 +16,7 @@ namespace lowlux::isp {
 /// each byte as the difference from the byte `predictor_step` before (Adobe Photoshop TIFF Technical Note 3).
 class FloatRows {
  public:
-  /// @param row_samples  of a strip or tile, at least 1
+  /// @param row_samples  samples of a row of a strip or tile, at least 1
   FloatRows(const RowStorage& storage, std::size_t row_samples);
 
   /// Returns the bytes of a row.

@@ -9,6 +9,7 @@
 
 namespace lowlux::isp {
 
+/// Holds the options of encode_jpeg().
 struct JpegOptions {
   int quality = 92;  // 1..100, the scale of the IJG library
   /// Selects chroma at full resolution, or at half in both directions.

@@ -20,7 +20,7 @@ namespace lowlux::isp {
 /// 1 to 4 components that are not subsampled, any predictor, restart intervals of whole lines; no point transform.
 class LosslessJpegRows {
  public:
-  /// @param row_samples  of a strip or tile, at least 1
+  /// @param row_samples  samples of a row of a strip or tile, at least 1
   LosslessJpegRows(const RowStorage& storage, std::size_t row_samples);
 
   /// Begins a strip or tile, whose bytes must stay until the next one.
@@ -38,7 +38,7 @@ class LosslessJpegRows {
   /// A Huffman table (T.81, annex C): `quick` holds category + 256 * length of the code that begins with these bits.
   struct Table {
     std::array<std::uint16_t, 512> quick{};
-    std::array<int, 17> max_code{};  // of each length; -1: there is none
+    std::array<int, 17> max_code{};  // largest code of each length; -1: there is none
     std::array<int, 17> first{};     // position of a length's code 0 in `categories`; may be negative
     std::vector<std::uint8_t> categories;
   };
@@ -67,7 +67,7 @@ class LosslessJpegRows {
   std::vector<std::uint16_t> line_, above_;   // columns x components
   std::size_t decoded_lines_ = 0, used_ = 0;  // samples of line_ that were handed out
 
-  std::span<const std::byte> data_;  // of the scan
+  std::span<const std::byte> data_;  // data of the scan
   std::size_t at_ = 0;
   std::uint64_t bits_ = 0;  // the lowest `bit_count_` were read and not used; the last `padding_` follow the data
   int bit_count_ = 0, padding_ = 0;

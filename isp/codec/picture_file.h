@@ -37,11 +37,13 @@ struct FileMetadata {
   std::optional<double> white_luminance_cd_m2;    // luminance of RGB (1, 1, 1) (OpenEXR whiteLuminance)
 };
 
+/// Holds a decoded image with the metadata of its file.
 struct DecodedPicture {
   Picture picture;
   FileMetadata metadata;
 };
 
+/// Holds the limits of decoders for untrusted files.
 struct DecodeLimits {
   std::int64_t max_pixels = std::int64_t{1} << 28;  // 268 MP; 3.2 GB as float RGB
 };

@@ -23,7 +23,7 @@ constexpr std::size_t max_inflated_bytes(std::size_t bytes) { return 1032 * byte
 /// Reads the bytes of rows from strips or tiles, one after another. Memory is that of one row.
 class StoredRows {
  public:
-  /// @param row_bytes  of a strip or tile, at least 1
+  /// @param row_bytes  bytes of a strip or tile, at least 1
   StoredRows(bool deflated, std::size_t row_bytes);
   StoredRows(const StoredRows&) = delete;
   StoredRows& operator=(const StoredRows&) = delete;
@@ -41,7 +41,7 @@ class StoredRows {
 
   std::size_t row_bytes_;
   std::vector<std::byte> inflated_;  // one row
-  std::span<const std::byte> rest_;  // of a part that is not deflated
+  std::span<const std::byte> rest_;  // rest of a part that is not deflated
   std::unique_ptr<Inflater> inflater_;
 };
 

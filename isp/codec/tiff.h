@@ -9,6 +9,7 @@
 
 namespace lowlux::isp {
 
+/// Holds the options of encode_tiff().
 struct TiffOptions {
   /// Deflate uses the horizontal predictor for integers and the floating-point predictor for floats. The README states
   /// its size and time on sensor noise.

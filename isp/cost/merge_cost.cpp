@@ -41,7 +41,7 @@ class Measurement {
     add(CostPart::merge_robust, "robust mean", 1);
     add(CostPart::merge_comparison, "comparison", frames);
     add(CostPart::merge_codes, "codes", 1);
-    const double mean_s = seconds_of(merged_, "mean") / unit_s_ / frames;  // of the reference, in what follows
+    const double mean_s = seconds_of(merged_, "mean") / unit_s_ / frames;  // included in the following times
     if (auto done = merge(MergeAlignment::cells); !done) return done;
     add(CostPart::merge_alignment, "alignment", frames - 1);
     add_placing(CostPart::merge_cells, mean_s);

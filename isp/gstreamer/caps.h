@@ -17,7 +17,7 @@ struct InputCaps {
   bool is_mosaic = true;  // false: monochrome
   int width = 0;
   int height = 0;
-  std::size_t row_bytes = 0;  // of the samples of a row
+  std::size_t row_bytes = 0;  // bytes of the samples of a row
   std::size_t stride = 0;     // GStreamer's of such frames: rows are padded to 4 pixels as bayer2rgb has it, monochrome
                               // ones to 4 bytes
 
@@ -28,9 +28,9 @@ struct InputCaps {
 
 /// Describes the frames of the source pad: pictures, or mosaics of 16 bits.
 struct OutputCaps {
-  std::uint32_t fourcc = 0;  // of lowlux_stage.h
-  GstVideoInfo picture{};    // of pictures
-  std::size_t stride = 0;    // of mosaics
+  std::uint32_t fourcc = 0;  // format code of lowlux_stage.h
+  GstVideoInfo picture{};    // format of images
+  std::size_t stride = 0;    // stride of mosaics, in bytes
   int width = 0;
   int height = 0;
 

@@ -15,7 +15,7 @@ namespace lowlux::merge {
 /// States what of a frame counts.
 struct MeanPart {
   PlaneView<const float> site_weight;           // inverse variance of one sample; without data all sites weigh the same
-  PlaneView<const std::uint8_t> block_matches;  // as Comparison has them; without data all count
+  PlaneView<const std::uint8_t> block_matches;  // like Comparison::block_matches; without data all blocks match
 };
 
 /// Adds a mosaic that was placed in whole cells.

@@ -25,7 +25,7 @@ MosaicNoise noise_in_light(const PerSite<double>& variance_e2, double light);
 
 /// Describes the blocks of a reference that are those of one frame, in a reference that is otherwise a mean of several.
 struct SingleFrameBlocks {
-  PlaneView<const std::uint8_t> is_single{};  // as Comparison::block_matches; without data there are none
+  PlaneView<const std::uint8_t> is_single{};  // like Comparison::block_matches; without data there are none
   MosaicNoise noise;
   double block_false_alarm = 0.1;  // replaces that of the comparison: other frames often differ there
 };
@@ -46,7 +46,7 @@ struct ComparisonOptions {
 struct Comparison {
   Plane<std::uint8_t> block_matches;  // ceil(height / 8) x ceil(width / 8): 1 where both show the same scene
   std::int64_t outliers = 0;          // sites set to NaN in the frame
-  double matching_fraction = 0;       // of the blocks that could be compared
+  double matching_fraction = 0;       // fraction of the comparable blocks that match
   /// Mean over all compared blocks of the squared difference over its predicted variance; 1 for a static scene.
   double mean_chi_square = 0;
 };
@@ -90,7 +90,7 @@ class MosaicComparer {
   static Thresholds thresholds_of(double block_false_alarm, double site_false_alarm);
 
   ComparisonOptions options_;
-  std::array<rows::BlockNoise, 2> noise_;  // of the blocks of the mean, and of those of a single frame
+  std::array<rows::BlockNoise, 2> noise_;  // noise of the blocks of the mean, and of those of a single frame
   std::array<Thresholds, 2> thresholds_;   // the same
 };
 

@@ -14,7 +14,7 @@ namespace lowlux::merge {
 inline constexpr double full_weight_fraction = 0.85;
 
 /// Sets saturated sites to NaN.
-/// @param saturation_e  of R, G and B
+/// @param saturation_e  saturation of R, G and B
 /// @param saturated     as large: set to 1 where a site is saturated, else to 0
 void remove_saturated(PlaneView<float> signal_e, BayerPhase phase, const std::array<double, 3>& saturation_e,
                       PlaneView<float> saturated, Executor& executor);

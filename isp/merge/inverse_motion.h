@@ -12,10 +12,10 @@ namespace lowlux::merge {
 struct InverseMotion {
   static constexpr int cell_px = 32;
 
-  int columns = 0;  // of cells; one more of nodes
+  int columns = 0;  // number of columns of cells; nodes have one column more
   int rows = 0;
   std::vector<Point> nodes;  // at (column * cell_px, row * cell_px) of the frame; NaN where there is no inverse
-  std::vector<double> area;  // of a pixel of the frame in pixels of the reference, for each cell
+  std::vector<double> area;  // area of a pixel of the frame in pixels of the reference, for each cell
 
   const Point& node(int column, int row) const {
     return nodes[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns + 1) +

@@ -72,7 +72,7 @@ struct ColourRowSums {
 /// that of the number of samples times the square of the mean share that samples have in pixels.
 class ColourMean {
  public:
-  static constexpr int max_frames = 255;  // whose weights the sums can hold
+  static constexpr int max_frames = 255;  // largest number of frames whose weights fit into the sums
 
   ColourMean(int width, int height);
 
@@ -89,7 +89,7 @@ class ColourMean {
 
   struct Image {
     Plane<float> samples;    // R, G, B of each pixel, interleaved
-    NoiseRatio noise_ratio;  // of the variance of a block to variance()
+    NoiseRatio noise_ratio;  // noise ratio of the variance of a block to variance()
   };
   /// Returns the mean of some rows. Values without samples are those of the prediction.
   /// @param rows      begin at a block, and end at one or at the last row

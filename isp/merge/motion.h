@@ -25,7 +25,7 @@ struct Motion {
   int spacing_px = 32;
   Plane<float> dx_px;  // rows x columns of nodes
   Plane<float> dy_px;
-  double standard_error_px = 0;  // of a node, for each axis, as the noise model predicts it
+  double standard_error_px = 0;  // standard error of a node, for each axis, as the noise model predicts it
   bool found = true;             // false: the frames do not determine a motion, and all displacements are 0
 
   /// Returns the displacement at a pixel of the reference; precondition: it lies within the nodes.

@@ -12,13 +12,13 @@ namespace lowlux::merge {
 /// Holds the mosaic that the frames of a camera at rest are compared with.
 struct StaticReference {
   Plane<float> mosaic;
-  Plane<std::uint8_t> is_single;  // as Comparison::block_matches: 1 where the mosaic is the reference frame alone
+  Plane<std::uint8_t> is_single;  // like Comparison::block_matches: 1 where the mosaic is the reference frame alone
 };
 
 /// Lists which scene counts where the reference frame shows another one than the others.
 enum class Scene : std::uint8_t {
-  majority,   // that of the others, where more than half of all frames agree on it, else that of the reference frame
-  reference,  // that of the reference frame
+  majority,   // content on which more than half of all frames agree, else that of the reference frame
+  reference,  // content of the reference frame
 };
 
 /// Returns the mean of the reference frame and of the robust mean of other frames where both show the same scene, and

@@ -36,8 +36,8 @@ void for_each_site(const Mosaics& of, const Area& area, int parity, const Use& u
 
 /// Holds the sum of t over the sites of a square.
 struct Found {
-  double t = 0;       // of detail
-  double t_mean = 0;  // of the means
+  double t = 0;       // factor of detail
+  double t_mean = 0;  // factor of the means
   double sites = 0;
 };
 

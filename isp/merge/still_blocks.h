@@ -25,7 +25,7 @@ class StillBlocks {
   StillBlocks(int width, int height);
 
   /// Adds a frame. All are as large as the reference, in its light; NaN where there is no value.
-  /// @param noise  of each of the three
+  /// @param noise  noise of each of the three frames
   void add(PlaneView<const float> reference, PlaneView<const float> aligned, PlaneView<const float> unmoved,
            const MosaicNoise& noise, Executor& executor);
 
@@ -34,10 +34,10 @@ class StillBlocks {
   Plane<std::uint8_t> blocks() const;
 
  private:
-  static constexpr int side_px = 2 * block_px;  // of the squares that are compared
+  static constexpr int side_px = 2 * block_px;  // side of the squares that are compared
 
   struct Sums {
-    std::vector<float> with_mean;  // of each frame: sum of t; only of the smallest squares
+    std::vector<float> with_mean;  // sum of t of each frame; only for the smallest squares
     std::vector<float> t;          // the same, of values without their means
     float sites = 0;               // mean over frames
   };

@@ -24,8 +24,8 @@ PeriodicLines periodic_lines(const PlaneView<const float>& plane, int period_px,
 struct RingError {
   double ring = 0;    // at distances of ring_inner_px to ring_outer_px; not a number if there are none
   double far = 0;     // at distances beyond ring_far_px
-  double mean = 0;    // of the error itself, in the ring
-  double pixels = 0;  // of the ring
+  double mean = 0;    // mean of the error itself, in the ring
+  double pixels = 0;  // number of pixels of the ring
 };
 inline constexpr int ring_inner_px = 2, ring_outer_px = 12, ring_far_px = 24;
 

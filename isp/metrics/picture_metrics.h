@@ -42,7 +42,7 @@ class PictureTruth {
 
 /// Measures the error of an image against the truth.
 struct PictureError {
-  double psnr_db = 0;           // of sRGB code values of all channels, peak 1; infinite if they are equal
+  double psnr_db = 0;           // PSNR of the sRGB code values of all channels, peak 1; infinite for equal images
   double ciede2000 = 0;         // mean over the pixels
   double chroma_rmse = 0;       // sqrt(mean(da*^2 + db*^2))
   double box_chroma_rmse = 0;   // RMSE of the means of a*, b* over boxes, which measures blotches

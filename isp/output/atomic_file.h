@@ -57,7 +57,7 @@ class AtomicFile {
   void withdraw() const;
   Result<void> sync_name() const;
 
-  std::string path_;       // as the caller named it
+  std::string path_;       // path that the caller gave
   std::string target_;     // after resolving symbolic links
   std::string temporary_;  // empty once it is removed or renamed
   Overwrite overwrite_;

@@ -29,6 +29,7 @@ struct PickedArea {
   int size = 16;  // side [px], 1 or more
 };
 
+/// Holds the request for a white balance.
 struct WhiteBalanceChoice {
   enum class Mode : std::uint8_t { as_shot, automatic, temperature, preset, gains, picked } mode = Mode::as_shot;
   double cct_k = 0;  // for Mode::temperature, white_min_k..white_max_k

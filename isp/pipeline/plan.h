@@ -21,7 +21,7 @@ namespace lowlux::isp {
 
 /// Holds everything decided about one frame before a pixel is processed.
 struct DevelopPlan {
-  DevelopOptions options;           // as requested
+  DevelopOptions options;           // options of the request
   std::optional<StepPlan> effects;  // set where DevelopOptions::effects requested it
   RawLevels levels;
   Rendering rendering;

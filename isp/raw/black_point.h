@@ -18,6 +18,7 @@ enum class BlackChoice {
   measured,   // only BlackRequest::measured, which must be set
 };
 
+/// Holds the request for a black level.
 struct BlackRequest {
   BlackChoice choice = BlackChoice::automatic;
   PerSite<double> given_dn{};  // for BlackChoice::given

@@ -9,7 +9,7 @@ namespace lowlux::isp::defect_rows {
 /// Bounds on the distance d of a sample from the range of its neighbours, whose nearer end is e; a sample is marked if
 ///     d^2 >= (range_factor range + floor_dn)^2 + variance_dn2 + shot_dn max(e - black_dn, 0)
 struct Bounds {
-  std::array<float, 2> black_dn{};  // of the even and of the odd samples, counted from the first
+  std::array<float, 2> black_dn{};  // black levels of the even and of the odd samples, counted from the first
   float range_factor = 0;
   float floor_dn = 0;
   float variance_dn2 = 0;

@@ -30,7 +30,8 @@ struct CaptureSharpening {
 /// is then too small rather than too large. A negative g D is limited so that no channel is lowered below three
 /// quarters of its least value within 2 pixels, where this is positive, else below that value: there are no dark lines
 /// next to lamps and edges. The result does not depend on the number of threads.
-/// @param variance  of the noise of Y, one value for each cell of 4 x 4 pixels: ceil(height / 4) x ceil(width / 4)
+/// @param variance  variance of the noise of Y, one value for each cell of 4 x 4 pixels: ceil(height / 4) x ceil(width
+/// / 4)
 void sharpen_capture(const CaptureSharpening& how, PlaneView<const float> variance, const RgbView<float>& rgb,
                      Executor& executor);
 

@@ -21,11 +21,13 @@ enum class ExposureRule : std::uint8_t {
 /// Returns "mid-grey", "night", "highlights", "black-noise", "no-gain", "most-gain" or "no-signal".
 std::string_view name_of(ExposureRule rule);
 
+/// Holds an automatic exposure and the rule that decided it.
 struct AutoExposure {
   double ev = 0;  // gain 2^ev on scene-linear values
   ExposureRule rule = ExposureRule::no_signal;
 };
 
+/// Holds the options of auto_exposure().
 struct AutoExposureOptions {
   double mid_grey = 0.18;             // maximum level that the median may reach
   double highlight = 0.9;             // level that the 99th percentile of the largest channel reaches, before the ...

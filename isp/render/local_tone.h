@@ -10,7 +10,7 @@ namespace lowlux::isp {
 /// Describes how much brighter shadows become and how much darker lights, and where neither may happen.
 struct LocalTone {
   float share = 0;                                     // 0..1: 0 changes nothing
-  std::array<float, 3> luminance{0.25f, 0.5f, 0.25f};  // of a unit of each channel; 1 is shown as white
+  std::array<float, 3> luminance{0.25f, 0.5f, 0.25f};  // luminance of a unit of each channel; 1 is shown as white
   float limit = 1;                                     // scene-linear value after exposure that it is: tone_limit
 };
 
@@ -33,7 +33,8 @@ inline constexpr double local_tone_noise = 2;
 /// too: gain_within_noise_limit. It is the largest M of a cell and its neighbours, and n is at most the geometric mean
 /// of the noise over such a square: noise reduction leaves more noise next to lamps, where less lift would be seen as a
 /// dark disc. The result does not depend on the number of threads.
-/// @param variance  of the noise of Y, one value for each cell of 4 x 4 pixels: ceil(height / 4) x ceil(width / 4);
+/// @param variance  variance of the noise of Y, one value for each cell of 4 x 4 pixels: ceil(height / 4) x ceil(width
+/// / 4);
 ///                  without data the noise is unknown: nothing is limited, and n = 2^-12 of middle grey
 void apply_local_tone(const LocalTone& how, PlaneView<const float> variance, const RgbView<float>& rgb,
                       Executor& executor);

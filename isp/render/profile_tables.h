@@ -38,7 +38,7 @@ std::shared_ptr<const ProfileTables> read_profile_tables(const SourceTags& tags,
 
 /// Returns the map for a white: between two maps linear in the inverse of the correlated colour temperature, as
 /// matrices are; absent if there is none.
-/// @param weight  of the calibration with the higher temperature, 0..1
+/// @param weight  weights of the calibration with the higher temperature, 0..1
 std::optional<HueSatMap> map_at(const ProfileTables& tables, double weight);
 
 /// Holds the tables in use for a frame. With v a pixel of linear values after exposure, divided by the tone curve's

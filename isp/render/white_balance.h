@@ -59,6 +59,7 @@ Result<WhiteBalance> white_balance_of_preset(const CameraColour& colour, WhitePr
 /// @param neutral  camera RGB, above 0
 WhiteBalance white_balance_of_neutral(const CameraColour& colour, const Vector3& neutral, WhiteSource source);
 
+/// Holds the options of auto_white_balance().
 struct AutoWhiteOptions {
   double norm = 6;       // exponent of the mean; 1 is grey world, infinity the brightest block; 6 is the paper's
   double clipped = 0.9;  // a block whose largest channel mean is above holds clipped pixels

@@ -30,7 +30,7 @@ inline constexpr double bench_lens_px = 0.9;
 
 /// A clean image blurred by the lens.
 struct BenchPicture {
-  std::string name;    // of the file
+  std::string name;    // name of the file
   SceneLinear linear;  // Rec. 709, 0..1
 };
 

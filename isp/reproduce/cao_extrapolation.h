@@ -24,6 +24,7 @@ enum class CaoExtrapolation : std::uint8_t {
 /// the colour at that low level that looks as the given one at 10 cd/m2.
 enum class CaoDirection : std::uint8_t { appearance, compensation };
 
+/// Describes one interpretation of the extrapolation in the thesis.
 struct CaoReading {
   CaoExtrapolation extrapolation = CaoExtrapolation::logarithm;
   CaoDirection direction = CaoDirection::appearance;

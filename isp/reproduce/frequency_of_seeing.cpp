@@ -84,7 +84,7 @@ Result<Finding> tail() {
   double term = std::exp(-x), sum = 0;
   for (int m = 0; m < k; ++m, term *= x / m) sum += term;
   // This is the first term of the series of P(K, x) and its bound: x^K e^-x / K! (1 + x / (K + 1) + ...).
-  int sign = 0;  // of the gamma function, which the thread-safe lgamma_r returns
+  int sign = 0;  // sign of the gamma function, which the thread-safe lgamma_r returns
   const double first = std::exp(k * std::log(x) - x - ::lgamma_r(k + 1.0, &sign));
   const bool agrees = std::fabs((1 - sum) / *exact - 1) < 1e-6;
   const bool bounded = *exact >= first * (1 - 1e-12) && *exact <= first / (1 - x / (k + 1)) * (1 + 1e-12);

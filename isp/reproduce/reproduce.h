@@ -18,7 +18,7 @@ struct Finding {
   enum class Kind : std::uint8_t { published, check };
 
   std::string id;         // EXPERIMENT/what
-  std::string claim;      // what was published or is checked, with its figure, equation or section
+  std::string claim;      // published or checked claim, with its figure, equation or section
   std::string published;  // the claim's value, for a check the expected one; "-" where the claim has none
   std::string ours;       // the same quantity, computed
   bool holds = false;
@@ -42,6 +42,7 @@ struct Outcome {
   std::vector<Plot> plots;
 };
 
+/// Holds the options of an experiment.
 struct RunOptions {
   std::uint64_t seed = 1;
   bool quick = false;           // fewer samples: the same findings with wider confidence intervals

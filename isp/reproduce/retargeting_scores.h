@@ -20,7 +20,7 @@ namespace lowlux::isp {
 
 /// Colours of an image: sRGB code values 0..1 of pixels that are evenly spread over it.
 struct PictureColours {
-  std::string name;  // of the file
+  std::string name;  // name of the file
   std::vector<Vector3> codes;
 };
 
@@ -99,7 +99,7 @@ CodeMap icam06_forward(double display_cd_m2);
 /// Inputs that all measurements have in common; borrowed.
 struct RetargetingWork {
   const std::vector<PictureColours>& pictures;
-  int table_levels;  // of the tables that represent the methods
+  int table_levels;  // levels of the tables that represent the methods
   const RunOptions& options;
   Executor& executor;
 };

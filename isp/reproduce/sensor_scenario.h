@@ -30,17 +30,19 @@ struct PatchResult {
   int saturated = 0;
 };
 
+/// Holds the results of all patches at one level of light.
 struct LevelResult {
   double level = 0;
   std::vector<PatchResult> patches;
 };
 
+/// Describes a scenario: the noise sources that are on.
 struct Scenario {
   Noises noises;
   std::uint32_t frame = 0;  // first frame of its random numbers; each level takes one
   int samples = 0;
   std::span<const double> levels = sensor_levels;
-  double light_factor = 1;  // of the light that a pixel collects, against the camera's own etendue
+  double light_factor = 1;  // factor of the light that a pixel collects, against the camera's own etendue
 };
 
 /// Scenarios of the thesis' chapter 4.

@@ -179,7 +179,7 @@ std::optional<Vector3> mean_code(const std::vector<Vector3>& dn) {
 
 double noticeable_differences(const Xy& from, const Xy& to) {
   constexpr double deviations = 3;
-  constexpr double unit = 1e-3;  // of the table's axes
+  constexpr double unit = 1e-3;  // unit of the table's axes
   const CieTable table = macadam1942_table();
   double nearest = std::numeric_limits<double>::infinity(), out = 0;
   for (std::size_t i = 0; i < table.cells.size(); i += table.columns.size()) {

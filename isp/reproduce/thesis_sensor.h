@@ -61,7 +61,7 @@ Vector3 dark_charge_e(const ThesisCamera& camera);
 Xyz xyz_of_charge(const ThesisCamera& camera, const Vector3& charge_e);
 
 /// Returns the first-order cloud of the measured chromaticity, for channels of independent noise.
-/// @param variance_e2  of each channel
+/// @param variance_e2  variance of each channel
 std::optional<ChromaticityCloud> sensor_cloud(const ThesisCamera& camera, const Vector3& mean_e,
                                               const Vector3& variance_e2);
 
@@ -77,7 +77,7 @@ struct Noises {
 
 /// Samples of one patch at one level.
 struct PatchSamples {
-  std::vector<Vector3> dn;  // of unsaturated samples
+  std::vector<Vector3> dn;  // codes of unsaturated samples
   int saturated = 0;        // number of samples with a channel that may be full: they have no colour, and are left out
 };
 

@@ -272,7 +272,7 @@ class StageCalls {
     require(expected == found);
   }
 
-  static constexpr std::size_t longest_row = 160;  // of most_pixels, whatever the format
+  static constexpr std::size_t longest_row = 160;  // of max_pixels, whatever the format
   FuzzInput& in_;
   lowlux_stage_settings settings_{};
   std::optional<NamedText> profile_;

@@ -18,7 +18,7 @@ struct Crosstalk {
 /// Where there is no neighbour, at the borders of the frame and of its light-shielded columns, the fraction stays in
 /// the pixel: the sum over the frame stays the same. Each photon, or its electron, goes its own way: counts stay
 /// independent and Poisson distributed.
-/// @param rate     of the frame [e-/s]
+/// @param rate     rate of the frame [e-/s]
 /// @param x0, y    of the first pixel
 /// @param rate_out its pixels from x0 on [e-/s]
 void mix_neighbours(const PlaneView<const float>& rate, const Crosstalk& crosstalk, int x0, int y,

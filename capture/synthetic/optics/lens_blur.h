@@ -33,7 +33,7 @@ class LensBlur {
   void blur_columns(PlaneView<const float> in, PlaneView<float> out, RowBand band) const;
 
   std::vector<double> kernel_;
-  std::vector<float> weights_;  // of the kernel, from T(1) on
+  std::vector<float> weights_;  // weights of the kernel, from T(1) on
 };
 
 }  // namespace lowlux::capture

@@ -16,10 +16,11 @@ using Development = std::function<SceneLinear(const DenoiseShot& shot, double ex
 
 /// Marks that a development leaves. Errors are in standard deviations of the raw noise of their pixel and channel.
 struct PictureMarks {
-  double cell = 0;         // periodic_lines() of 2 px in codes of a flat lifted by 5 EV, all channels
-  double block_8 = 0;      // of 8 px, without those of 2 px
-  double block_16 = 0;     // of 16 px, without those of 2 px
-  double cell_of_raw = 0;  // as `cell`, over the lines of white noise of the raw's variance, the largest of a channel
+  double cell = 0;      // periodic_lines() of 2 px in codes of a flat lifted by 5 EV, all channels
+  double block_8 = 0;   // lines with a period of 8 px, without those of 2 px
+  double block_16 = 0;  // lines with a period of 16 px, without those of 2 px
+  double cell_of_raw =
+      0;  // like `cell`, relative to lines of white noise with the raw variance; largest of the channels
   double block_8_of_raw = 0;
   double block_16_of_raw = 0;
   double cell_codes = 0;   // root mean square of the pattern of 2 px [8-bit codes]
@@ -33,8 +34,8 @@ struct PictureMarks {
 };
 
 /// Measures all marks. Scenes are those of the held-out seeds.
-/// @param mean_e  of every scene; of the flat, before it is lifted
-/// @param size  of each scene, even; at least 160 x 96
+/// @param mean_e  mean of every scene; of the flat, before it is lifted
+/// @param size  size of each scene, even; at least 160 x 96
 PictureMarks measure_marks(const Development& develop, double mean_e, const SceneSize& size);
 
 /// Returns the largest amplitude that lines of white noise have in one flat: their expectation and five standard

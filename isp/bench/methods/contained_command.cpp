@@ -261,7 +261,7 @@ std::string signal_text(int number, const CommandLimits& limits) {
 
 /// Returns the Error of a command that did not exit with 0.
 std::optional<Error> failure_of(int status, const std::filesystem::path& folder, const CommandLimits& limits) {
-  constexpr int not_found_exit = 127, signal_exit = 128;  // of /bin/sh
+  constexpr int not_found_exit = 127, signal_exit = 128;  // exit codes of /bin/sh
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return std::nullopt;
   const std::string printed = last_printed(folder);
   if (WIFSIGNALED(status)) return Error{ErrorCode::unreadable, signal_text(WTERMSIG(status), limits) + printed, {}};

@@ -19,14 +19,14 @@ inline constexpr bool command_memory_is_limited = true;
 /// Limits of one run of a command.
 struct CommandLimits {
   double max_wall_s = 120;
-  std::uint64_t max_file_bytes = std::uint64_t{1} << 30;    // of each file that it writes
+  std::uint64_t max_file_bytes = std::uint64_t{1} << 30;    // largest size of each file that it writes
   std::uint64_t max_memory_bytes = std::uint64_t{4} << 30;  // writable memory of each of its processes
 };
 
 /// Holds the resources that a command used.
 struct CommandUse {
   double wall_s = 0;
-  double cpu_s = 0;       // of all its processes that it waited for
+  double cpu_s = 0;       // processor time of all its processes that it waited for
   double peak_bytes = 0;  // largest resident memory of one of them
 };
 

@@ -20,8 +20,8 @@ using MethodImage = std::variant<RawFrame, SceneLinear>;
 
 /// A method to score: a command line or a function that makes an image of a noisy raw frame.
 struct ScoredMethod {
-  std::string name;                                                // see is_method_name
-  std::string command;                                             // of /bin/sh, see expand_command; empty: `call`
+  std::string name;     // see is_method_name
+  std::string command;  // command for /bin/sh, see expand_command; empty: `call`
   std::function<Result<MethodImage>(const RawFrame& noisy)> call;  // time and memory are not limited
   bool ours = false;                                               // a level of lowlux
 };
@@ -29,7 +29,7 @@ struct ScoredMethod {
 /// The image that a method made, and what it used.
 struct MethodRun {
   MethodImage image;
-  CommandUse use;  // of a function: peak_bytes is not a number
+  CommandUse use;  // use of resources; peak_bytes of a function is not a number
 };
 
 /// Returns whether a name has 1 to 40 letters, digits and ._- and begins with a letter or digit.

@@ -21,9 +21,10 @@ struct StarPlace {
 /// A scene that methods are scored on.
 struct MethodScene {
   BenchPicture picture;
-  std::vector<StarPlace> stars;  // of a field of stars; else none
+  std::vector<StarPlace> stars;  // stars of a field of stars; empty for other scenes
 };
 
+/// Holds the size of a scene in pixels.
 struct SceneSize {
   int width = 0;
   int height = 0;

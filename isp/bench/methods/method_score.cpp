@@ -14,7 +14,7 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// Returns the sum of the channels, weighted to luminance; of codes the luma.
 Plane<float> weighted(const SceneLinear& image) {
-  const Vector3 weights = luminance_weights(OutputSpace::linear_srgb).value();  // of a space with primaries
+  const Vector3 weights = luminance_weights(OutputSpace::linear_srgb).value();  // weights of a space with primaries
   Plane<float> out(image.width(), image.height());
   for (std::size_t i = 0; i < out.size(); ++i) {
     double sum = 0;

@@ -14,7 +14,7 @@ using DoublePlanes = std::array<Plane<double>, 3>;
 
 /// Interpolates each missing colour by the 5 x 5 filters of Malvar, He & Cutler (ICASSP 2004, figure 2).
 /// @param in   at least 3 x 3 pixels, finite
-/// @param out  of the same size
+/// @param out  out of the same size
 void demosaic_malvar(const SignedMosaic& in, DoublePlanes& out);
 
 /// Interpolates each missing colour as the mean of its two or four nearest sites.

@@ -35,7 +35,7 @@ SceneLinear chromatic_filtered(const RgbView<const float>& linear, const Chromat
 /// Parameters of other methods, chosen for each light on the tuning set.
 struct TunedParameters {
   ChromaticWindows windows;
-  std::array<double, 3> stabilised_gain{1, 1, 1};  // of gat_denoise
+  std::array<double, 3> stabilised_gain{1, 1, 1};  // gains of gat_denoise
 };
 
 /// Input of a method.
@@ -45,8 +45,8 @@ struct MethodInput {
   const TunedParameters& tuned;
   const NlMeans* nl_means = nullptr;
   NlMeansStrength strength;  // optimum found by search
-  int rounds = 1;            // of timing
-  int slow_rounds = 1;       // of methods that take a second or more for each megapixel
+  int rounds = 1;            // number of rounds in which times are measured
+  int slow_rounds = 1;       // number of rounds of methods that take a second or more for each megapixel
 };
 
 /// Result of a method, and the CPU time of the denoising alone on one thread: the median of the rounds, their
@@ -67,6 +67,7 @@ struct MethodMemory {
 
 enum class MethodKind : std::uint8_t { ceiling, other, ours };
 
+/// Describes a row of the stage `denoise`.
 struct DenoiseMethod {
   std::string name;
   MethodKind kind = MethodKind::other;

@@ -58,7 +58,7 @@ constexpr int places = 400;
 constexpr double counting_noise_e = 1e-6;  // below it f(j + sigma x) differs from f(j) by less than 1e-11 in the mean
 
 double log_factorial(double n) {
-  int sign = 0;  // of the gamma function, which the thread-safe lgamma_r returns
+  int sign = 0;  // sign of the gamma function, which the thread-safe lgamma_r returns
   return ::lgamma_r(n + 1, &sign);
 }
 

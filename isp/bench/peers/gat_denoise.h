@@ -16,7 +16,7 @@ namespace lowlux::isp {
 /// and their mean, taken as a variance, is 3e-3 of the square of that at 2000 e-. Chroma starts at the level that q = s
 /// / sqrt(s + d + sigma^2) of the entire image requires, and is not drawn towards neutral, which stabilised values do
 /// not have.
-/// @param white_gain  of the stabilised colours
+/// @param white_gain  white gain of the stabilised colours
 /// @param signal_e  as large as the shot
 void gat_denoise(denoise::Denoiser& denoiser, const DenoiseShot& shot, denoise::Level level,
                  const std::array<double, 3>& white_gain, PlaneView<float> signal_e, Executor& executor);

@@ -16,7 +16,7 @@ namespace lowlux::isp {
 
 /// Amount of light, and the sensor's dark charge and noise.
 struct DenoiseLight {
-  double mean_e = 0;        // of the signal, over all pixels of the mosaic
+  double mean_e = 0;        // mean of the signal, over all pixels of the mosaic
   double dark_e = 0;        // mean dark charge of every pixel
   double read_noise_e = 0;  // standard deviation
 };

@@ -14,7 +14,7 @@ namespace lowlux::isp {
 /// Amount of light of a simulated raw frame, and the sensor's dark charge and noise.
 struct DevelopLight {
   std::string name;
-  double mean_e = 0;        // of the signal, over all pixels of the mosaic
+  double mean_e = 0;        // mean of the signal, over all pixels of the mosaic
   double dark_e = 0;        // mean dark charge of every pixel
   double read_noise_e = 0;  // standard deviation
   double gain_dn_per_e = 0;

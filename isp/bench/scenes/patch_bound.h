@@ -30,7 +30,7 @@ class PatchBound {
 
  private:
   struct Patch {
-    int x, y;  // of its first pixel
+    int x, y;  // position of its first pixel
     UvPrime truth;
   };
   std::vector<Patch> patches_;

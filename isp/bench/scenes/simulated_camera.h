@@ -60,7 +60,7 @@ NoiseSourcePlan plan_keeping(NoiseSourceSet kept, int width, int height);
 struct EvenLight {
   SensorModel sensor;
   Exposure exposure;
-  std::array<double, 3> rate_e_per_s{};  // of R, G and B
+  std::array<double, 3> rate_e_per_s{};  // rates of R, G and B
   int width = 0;                         // width of the active area
   int height = 0;
   int masked_columns = 0;  // dark columns to the left of it; even

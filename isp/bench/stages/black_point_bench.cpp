@@ -51,7 +51,7 @@ Grey grey_with(const PerSite<double>& error_e) {
 /// Errors of the black points of many frames.
 struct BlackErrors {
   double rms_e = 0;      // over sites and seeds
-  double ciede2000 = 0;  // of the grey, mean over the seeds
+  double ciede2000 = 0;  // CIEDE2000 of the grey, mean over the seeds
   double uv_shift = 0;   // rms
 };
 

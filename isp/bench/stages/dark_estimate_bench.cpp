@@ -52,7 +52,7 @@ NamedSensor sensor_of(const BenchSensor& sensor) {
 
 /// Describes one frame: light, exposure, and the dark charge that follows.
 struct Draw {
-  double mean_e;  // of the signal, over the pixels
+  double mean_e;  // mean of the signal, over the pixels
   Exposure exposure;
   std::size_t picture;
   std::uint64_t seed;
@@ -145,9 +145,9 @@ Result<RawFrame> frame_of(const BenchPicture& picture, const NamedSensor& sensor
 /// Holds what became of the frames of one sensor.
 struct Tally {
   int frames = 0, matter = 0, used = 0, used_where_it_matters = 0, refused = 0, not_expected = 0, worse = 0;
-  std::vector<double> relative_errors;  // of estimates that were used
+  std::vector<double> relative_errors;  // relative errors of the estimates that were used
   std::vector<double> relative_standard_errors;
-  double deviation_squares = 0;  // of errors in standard errors
+  double deviation_squares = 0;  // sum of squared errors, in standard errors
   Series estimates;              // over the truth
 
   void add(const DarkCharge& found, double truth_e, double mean_e) {

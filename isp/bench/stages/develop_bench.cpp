@@ -37,7 +37,7 @@ constexpr std::string_view light_of_images = "20 e-";
 /// Options of develop, in addition to the look.
 struct PlanChoice {
   std::optional<Level> level;  // absent: off
-  bool repairs = true;         // of detected defects, and of lines
+  bool repairs = true;         // repairs of detected defects, and of lines
   bool half = false;
   std::optional<DemosaicMethod> demosaic;
 
@@ -108,7 +108,7 @@ struct Scene {
   const RawFrame& noisy;
   const RawFrame& mean;
   double exposure_ev = 0;  // automatic, of the mean frame
-  double noisy_ev = 0;     // of the noisy frame, for the same brightness
+  double noisy_ev = 0;     // exposure of the noisy frame, for the same brightness
   PictureTruth truth;
 };
 

@@ -39,7 +39,7 @@ Result<BenchOutcome> run_develop_bench(const BenchOptions& options);
 /// One is negative where two errors partly cancel each other.
 struct ErrorSources {
   double demosaicing = 0;
-  double noise = 0;      // what noise reduction and repairs leave and lose
+  double noise = 0;      // error by remaining noise, and by detail lost in noise reduction and repairs
   double black = 0;      // error of the measured black level
   double rendering = 0;  // rounding to 8 bits
 

@@ -18,7 +18,7 @@ struct MethodRow {
   std::string run_as;  // "program", "function"; empty: not run
   MethodScore score;
   double ms_per_mp = 0;      // wall clock; not a number where nothing was run
-  double cpu_ms_per_mp = 0;  // of all threads
+  double cpu_ms_per_mp = 0;  // processor time of all threads
   double peak_mib = 0;       // largest resident memory; not a number where it is not known
   int rank = 0;              // by PSNR in its light, 1 the best; 0: the noise-free mosaic, which is not ranked
   bool undominated = false;  // no other method of its light is faster and as good in CIEDE2000, or better and as fast

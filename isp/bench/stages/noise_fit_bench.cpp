@@ -42,7 +42,7 @@ AccuracyTiming timing_of(const BenchOptions& options) { return {.rounds = option
 /// Numbers of frames, and of their pixels.
 struct FlatAmount {
   int side;
-  int pairs;  // of darks, and of each level of light
+  int pairs;  // pairs of darks, and of each level of light
   int seeds;
 };
 

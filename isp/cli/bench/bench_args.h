@@ -17,9 +17,9 @@ struct BenchArgs {
   std::string pictures_folder;      // empty: next to the command
   isp::PictureSet pictures = isp::PictureSet::held_out;
   std::vector<std::string> methods;  // NAME=COMMAND, or the name of a ready one
-  std::uint64_t seed = 1;            // of the stage `methods`
-  double time_limit_s = 120;         // of one run of a method
-  Shard shard;                       // of the stages; of the lights of `methods` if that is the only one
+  std::uint64_t seed = 1;            // seed of the stage `methods`
+  double time_limit_s = 120;         // time limit of one run of a method
+  Shard shard;                       // shard of the stages; of the lights of `methods` if that is the only one
   int threads = 0;                   // 0: one for each processor
   bool list = false;
   bool calibrate_cost = false;  // then nothing else is run

@@ -24,6 +24,7 @@ struct CalibrateArgs {
   bool quiet = false;
 };
 
+/// Holds the arguments of `calibrate black`.
 struct CalibrateBlackArgs {
   CalibrateArgs common;
   std::optional<double> system_gain_dn_per_e;
@@ -31,6 +32,7 @@ struct CalibrateBlackArgs {
   std::string map;      // prefix of the maps' names; empty: none
 };
 
+/// Holds the arguments of `calibrate noise`.
 struct CalibrateNoiseArgs {
   CalibrateArgs common;
   std::vector<std::string> darks;
@@ -38,6 +40,7 @@ struct CalibrateNoiseArgs {
   std::optional<calib::PictureNoiseMethod> method;  // for a single image; absent: ponomarenko
 };
 
+/// Holds the arguments of `calibrate sheet`.
 struct CalibrateSheetArgs {
   CalibrateArgs common;  // `frames` are flats; `output` is the page
   std::vector<std::string> darks;
@@ -45,6 +48,7 @@ struct CalibrateSheetArgs {
   std::optional<calib::Irradiance> irradiance;  // with steady light
 };
 
+/// Holds the arguments of `calibrate quoted`.
 struct CalibrateQuotedArgs {
   CalibrateArgs common;  // `frames` holds the sensor's name
 };
@@ -58,6 +62,7 @@ std::string json_of_sheet(const std::string& page);
 
 Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string>& words);
 
+/// Holds the arguments of `calibrate colour`.
 struct CalibrateColourArgs {
   std::string chart;       // a raw file; empty: spectral sensitivities
   std::string camera;      // an entry of the table, or a CSV file; empty: a chart

@@ -27,7 +27,7 @@ constexpr const char* method = "EMVA 1288 release 4.0 linear";
 /// A figure of the sheet. Texts and JSON have the same ones.
 struct Figure {
   std::string name;
-  std::string key;  // of JSON, with its unit
+  std::string key;  // JSON key, with its unit
   std::optional<Estimate> value;
   std::string unit;
   double shown = 1;  // factor from `value` to the unit of the text: 100 for percent

@@ -50,9 +50,9 @@ class AutoExposure {
   std::optional<isp::StatedExposure> stated_by(const capture::FrameFacts& facts) const;
 
   capture::Camera& camera_;
-  std::vector<capture::CameraGain> gains_;     // of the controller; empty: the camera's stays
+  std::vector<capture::CameraGain> gains_;     // gains of the controller; empty: the camera's stays
   std::optional<PerSite<double>> black_dn_;    // given
-  std::optional<PerSite<double>> darkest_dn_;  // of all frames, where black is not known
+  std::optional<PerSite<double>> darkest_dn_;  // darkest codes of all frames, if black is not known
   double clipped_fraction_;
   isp::ExposureController controller_;
   isp::ExposureMeter meter_;

@@ -79,7 +79,7 @@ class PictureSink final : public CaptureSink {
   std::optional<CameraProfile> profile_;
   Executor& executor_;
   isp::Pipeline pipeline_;
-  FrameInfo info_;  // of the last frame developed
+  FrameInfo info_;  // info of the last frame developed
 };
 
 class RawSink final : public CaptureSink {

@@ -7,6 +7,7 @@
 
 namespace lowlux::cli {
 
+/// Holds the connected cameras.
 struct CameraList {
   std::vector<capture::CameraListing> v4l2;
   std::vector<capture::CameraListing> libcamera;

@@ -20,7 +20,7 @@ struct AutoExposureArgs {
   std::optional<double> max_gain;   // a factor
   std::optional<isp::Mains> mains;  // absent: those of either frequency
   std::optional<double> clipped_fraction;
-  std::vector<capture::CameraGain> gain_codes;  // of a V4L2 camera, by rising factor
+  std::vector<capture::CameraGain> gain_codes;  // gain codes of a V4L2 camera, by rising factor
 };
 
 /// Adds the options of automatic exposure.

@@ -66,7 +66,7 @@ class ArrayFile {
 
   isp::AtomicFile file_;
   std::string path_;
-  std::vector<std::size_t> begins_;  // of the arrays in the file
+  std::vector<std::size_t> begins_;  // starts of the arrays in the file
 };
 
 /// Writes one array for NumPy.

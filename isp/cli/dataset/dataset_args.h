@@ -8,6 +8,7 @@
 
 namespace lowlux::cli {
 
+/// Holds the arguments of `dataset`.
 struct DatasetArgs {
   std::string spec;
   std::string output;  // a folder; created if it does not exist

@@ -12,7 +12,7 @@ namespace lowlux::cli {
 /// Holds a sample that is complete on the disk.
 struct DatasetSample {
   std::string files;        // JSON: [{"name", "bytes", "sha256"}], the parameters' file last
-  std::uint64_t bytes = 0;  // of all files
+  std::uint64_t bytes = 0;  // bytes of all files
 };
 
 /// Returns the sample of an index if it is complete in a folder: its parameters, which are written last, are those of

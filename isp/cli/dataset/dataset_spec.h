@@ -29,10 +29,11 @@ std::span<const Setting> settings();
 struct Distribution {
   enum class Kind : std::uint8_t { choice, uniform, log_uniform };
   Kind kind = Kind::choice;
-  std::vector<std::string> choices;  // as JSON; each equally likely; one: a constant
-  double low = 0, high = 0;          // of ranges, low < high
+  std::vector<std::string> choices;  // values as JSON, equally likely; a single one is a constant
+  double low = 0, high = 0;          // limits of ranges, low < high
 };
 
+/// Holds a setting of a data set and the distribution from which it is drawn.
 struct DrawnSetting {
   const Setting* setting = nullptr;
   Distribution distribution;
@@ -46,7 +47,7 @@ struct DatasetSensor {
 
 /// Describes a file that a spec names.
 struct DatasetInput {
-  std::string name;  // as the spec has it
+  std::string name;  // name in the spec
   FileHash hash;
 };
 
@@ -56,18 +57,18 @@ enum class SampleFormat : std::uint8_t { dng, npy, safetensors };
 
 /// Describes a data set.
 struct DatasetSpec {
-  std::string folder;  // of the spec's file: names of files are relative to it
+  std::string folder;  // folder of the spec's file: names of files are relative to it
   std::uint64_t first_index = 0;
   std::uint64_t count = 0;  // first_index + count is at most 2^63
   std::vector<std::string> scenes;
   std::vector<DatasetSensor> sensors;
   bool mask = true;
   bool truth_electrons = false;
-  std::optional<SampleFormat> format;  // as given; absent: dng
+  std::optional<SampleFormat> format;  // format that was given; absent: dng
   std::vector<DatasetInput> inputs;
   std::string identity;     // JSON: the spec without first_index and count, and the hashes of its files
-  std::string sha256;       // of `identity`: together with an index it determines a sample
-  std::string draw_sha256;  // of `identity` without the format, which does not change what is drawn
+  std::string sha256;       // SHA-256 of `identity`: together with an index it determines a sample
+  std::string draw_sha256;  // SHA-256 of `identity` without the format, which does not change what is drawn
 };
 
 /// Returns whether a scene is generated: any other is an image file.

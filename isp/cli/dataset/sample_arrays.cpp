@@ -15,7 +15,7 @@ namespace lowlux::cli {
 namespace {
 
 /// Returns the name of a file of an array, like that of a file of the format DNG.
-/// @param ending  of the latter
+/// @param ending  ending of the latter
 std::string array_name(const std::string& file, std::string_view ending, std::string_view array_ending) {
   assert(file.empty() || file.ends_with(ending));
   return file.empty() ? file : file.substr(0, file.size() - ending.size()).append(array_ending);

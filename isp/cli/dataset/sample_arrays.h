@@ -33,7 +33,7 @@ Plane<std::uint8_t> mask_of(const RawFrame& frame, const SimulateArgs& args, con
 /// width x 3. Errors: those of ArrayFile.
 class SampleArrays {
  public:
-  /// @param files  of the sample in the format DNG: arrays are named like these
+  /// @param files  files of the sample in the format DNG: arrays are named like these
   SampleArrays(SampleFormat format, const SimulateFiles& files, const std::string& stem, bool masks);
 
   /// Returns the names of all files.
@@ -59,7 +59,7 @@ class SampleArrays {
   std::string all_;                        // the file of `safetensors`
   std::vector<std::string> raws_, masks_;  // files of `npy`, one for each frame; no masks: empty
   std::string truth_, electrons_;          // likewise; empty: there is none
-  std::vector<ArrayEntry> entries_;        // of file_
+  std::vector<ArrayEntry> entries_;        // entries of file_
   std::optional<ArrayFile> file_;
 };
 

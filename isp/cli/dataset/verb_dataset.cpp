@@ -124,11 +124,11 @@ struct SampleCost {
 };
 
 struct DatasetOutcome {
-  std::uint64_t samples = 0;   // of the shard
+  std::uint64_t samples = 0;   // samples of the shard
   std::uint64_t made = 0;      // in this run; the others were complete
   std::uint64_t measured = 1;  // samples whose mean cost is `cost`
   std::optional<SampleCost> cost;
-  double bytes = 0;  // of all complete samples
+  double bytes = 0;  // bytes of all complete samples
 };
 
 Result<DatasetSample> measured_sample(const DatasetSpec& spec, std::uint64_t index, const std::string& folder,

@@ -260,7 +260,7 @@ Result<void> DarkSource::adopt_masters(const RawDn& picture, const calib::FrameS
 }
 
 Result<void> DarkSource::check_bias_times(const RawDn& picture) const {
-  constexpr double max_time = 0.1;  // of the image's
+  constexpr double max_time = 0.1;  // largest fraction of the exposure time of the image
   for (std::size_t g = files_.darks; g < raw_groups_; ++g) {
     const auto& bias_s = files_.groups[g].setting.exposure_s;
     if (!bias_s || !picture.info.exposure_s || *bias_s <= max_time * *picture.info.exposure_s) continue;

@@ -44,9 +44,9 @@ Result<DarkNames> dark_files(const DevelopArgs& args, const std::vector<Job>& jo
 
 /// Holds the dark frames of the files as they were read.
 struct DarkFiles {
-  std::vector<calib::DarkGroup> groups;  // of raw files: dark frames, then bias frames
+  std::vector<calib::DarkGroup> groups;  // groups of raw files: dark frames, then bias frames
   std::size_t darks = 0;                 // number of groups that are of dark frames
-  std::vector<MosaicTiff> masters;       // of TIFF files, which state no setting
+  std::vector<MosaicTiff> masters;       // master darks from TIFF files, which state no setting
 };
 
 /// Holds the data of the dark frames of all images, and the last frames that were made. It may be used from any thread.

@@ -56,14 +56,14 @@ struct DevelopArgs {
   isp::DevelopOptions options;               // white balance, black, half, defects, exposure
   std::string black_profile;                 // a camera's profile for black and noise; empty: none
   std::string profile;                       // a camera's profile for everything, colour too; empty: none
-  std::string gain_setting;                  // of the profile; empty: by the frame's ISO
+  std::string gain_setting;                  // gain setting of the profile; empty: by the frame's ISO
   std::optional<calib::NoiseFigures> noise;  // --noise
   int jpeg_quality = 92;
   int jobs = 0;  // files at a time; 0: one for each processor
-  Shard shard;   // of the files
+  Shard shard;   // shard of the files
   bool force = false;
   bool skip_existing = false;
-  isp::DngCompression compression = isp::DngCompression::none;  // of the raw files written
+  isp::DngCompression compression = isp::DngCompression::none;  // compression of the raw files written
   bool sync = false;                                            // files are flushed to disk before the next one begins
   bool json = false;
   bool timings = false;
@@ -75,15 +75,17 @@ struct DevelopArgs {
   EffectsArgs effects;
   bool merge = false;  // all inputs are frames of one scene
   MergeArgs merging;
-  Defaults defaults;  // of the user's file
+  Defaults defaults;  // defaults of the user's file
 };
 
+/// Holds the arguments of `info`.
 struct InfoArgs {
   std::vector<std::string> inputs;  // may be empty with --advise
   bool json = false;
   AdviseArgs advise;
 };
 
+/// Holds the arguments of `reproduce`.
 struct ReproduceArgs {
   std::vector<std::string> experiments;  // by id; empty: all
   std::string output;                    // folder for tables, plots and the report; empty: none

@@ -17,7 +17,7 @@ struct MosaicTiff {
   bool scaled = false;  // its values are at most 1 and were taken as fractions of 65535, as Siril and PixInsight save
   /// White level of a DNG, in its own units: values are scaled to the white level of the image. Absent: codes.
   std::optional<double> white;
-  FrameInfo info;  // what the file states
+  FrameInfo info;  // metadata of the file
 };
 
 /// Returns whether the file has the extension of a TIFF: .tif or .tiff in any case.

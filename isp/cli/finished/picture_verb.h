@@ -16,7 +16,7 @@ namespace lowlux::cli {
 
 /// Holds the arguments common to the verbs that convert one image to another.
 struct PictureVerb {
-  std::string name;                 // of the verb
+  std::string name;                 // name of the verb
   std::vector<std::string> inputs;  // files that are read, the image first
   std::string output;
   std::optional<int> bits;
@@ -24,7 +24,7 @@ struct PictureVerb {
   bool force = false;
   bool json = false;
   bool quiet = false;
-  Defaults defaults = {};  // of the user's file
+  Defaults defaults = {};  // defaults of the user's file
 };
 
 /// Reads, processes, writes by write_made() and prints its report; returns warnings.

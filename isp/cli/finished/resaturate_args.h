@@ -25,7 +25,7 @@ struct ResaturateArgs {
   bool force = false;
   bool json = false;
   bool quiet = false;
-  Defaults defaults;  // of the user's file
+  Defaults defaults;  // defaults of the user's file
 };
 
 Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words);

@@ -21,7 +21,7 @@ struct RetargetArgs {
   bool force = false;
   bool json = false;
   bool quiet = false;
-  Defaults defaults;  // of the user's file
+  Defaults defaults;  // defaults of the user's file
 };
 
 Parsed<RetargetArgs> parse_retarget(const std::vector<std::string>& words);

@@ -21,17 +21,19 @@ struct HelpEntry {
   bool repeats = false;  // an argument that may be given several times
 };
 
+/// Holds a titled section of options.
 struct HelpSection {
   std::string title;
   std::vector<HelpEntry> entries;
 };
 
+/// Holds the help of a verb.
 struct HelpPage {
   std::string verb;  // "develop", "calibrate black"
   std::string description;
   std::vector<HelpEntry> arguments;
-  HelpSection front;              // what most people use: all that --help shows
-  std::vector<HelpSection> rest;  // what --help-all shows in addition
+  HelpSection front;              // most used options, which --help shows
+  std::vector<HelpSection> rest;  // options that --help-all shows in addition
   std::string notes;              // paragraph after the options
   std::vector<std::string_view> examples;
 };

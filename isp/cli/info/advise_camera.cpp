@@ -304,7 +304,7 @@ Result<RawLuminance> raw_luminance(const RawFrame& frame, const FrameInfo& info,
   if (!black) return tl::make_unexpected(black.error());
   std::vector<float> green = green_fractions(frame.raw, *black);
   if (green.empty()) return fail(ErrorCode::insufficient, "the file has no green pixels; give --luminance");
-  constexpr double clipped = 0.995;  // of the range, for noise and the last code
+  constexpr double clipped = 0.995;  // fraction of the range, which leaves room for noise and the last code
   const double highlight = exceeded_by(green, std::clamp(share, 0.0, 1.0));
   const double median = exceeded_by(green, 0.5);
   if (!(median > 0)) {

@@ -14,7 +14,7 @@ namespace lowlux::cli {
 struct AdviceCase {
   isp::AdviceRequest request;
   std::string camera;              // sensor and source of its values
-  std::vector<std::string> notes;  // what was assumed or estimated, one line each
+  std::vector<std::string> notes;  // assumptions and estimates, one line each
 };
 
 /// Returns the request of the arguments. A named sensor has its gain settings of isp/model/sensor_db and receives light

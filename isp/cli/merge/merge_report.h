@@ -13,7 +13,7 @@ namespace lowlux::cli {
 struct MergeReport {
   std::vector<std::string> inputs;
   isp::MergedRaw merged;             // its frame is not reported
-  std::optional<NoiseOrigin> noise;  // of the reference
+  std::optional<NoiseOrigin> noise;  // noise of the reference
 };
 
 /// Returns a warning of frames that were aligned, and match the reference nearly nowhere; nullopt if there are none.

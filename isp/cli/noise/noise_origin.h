@@ -20,7 +20,7 @@ struct NoiseOrigin {
     picture,       // measured on the image
     darktable,     // the user's darktable has figures of the camera
     raspberry_pi,  // libcamera's tuning files have figures of the sensor
-    sensor_class,  // what sensors of its class have in the median
+    sensor_class,  // median of the sensors of its class
   };
 
   Source source = Source::file;

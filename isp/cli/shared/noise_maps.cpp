@@ -13,7 +13,7 @@ namespace lowlux::cli {
 namespace {
 
 /// Returns the cells that intersect a crop.
-/// @param side  of a cell, in pixels
+/// @param side  side of a cell, in pixels
 Plane<float> cropped(const Plane<float>& cells, const Rect& crop, int side) {
   const int left = crop.x / side, top = crop.y / side;
   Plane<float> out((crop.x + crop.width + side - 1) / side - left, (crop.y + crop.height + side - 1) / side - top);

@@ -22,7 +22,7 @@ struct Job {
 /// ends with /), with `extension` unless the arguments name a format. Inputs of one name with several extensions have
 /// outputs named with these, as one_nef.png and one_dng.png, which is printed unless the arguments are quiet. Inputs
 /// that are folders stand for the raw files in them, and - for standard input and output. Errors: those of
-/// wrong_streams; those of raw_files_of; with ErrorCode::invalid_argument (invalid arguments) several inputs and no
+/// stream_error; those of raw_files_of; with ErrorCode::invalid_argument (invalid arguments) several inputs and no
 /// folder, two inputs for one image, an image that would replace its own raw file.
 Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string& extension);
 

@@ -16,7 +16,7 @@ struct ProfileChoice {
   bool everything = false;   // includes its colour matrices
   bool with_darks = false;   // dark frames are going to give the level: the noise, from which they are made, is that of
                              // the profile, the same for all images
-  std::string gain_setting;  // as in calib::gain_named; empty: by the frame's ISO
+  std::string gain_setting;  // name for calib::gain_named; empty: by the frame's ISO
 };
 
 /// Replaces values of a frame's file with those of a camera's profile: noise, hot pixels to be repaired, warnings, and

@@ -28,9 +28,9 @@ struct DevelopOutcome {
   std::shared_ptr<const calib::FlatField> flat;  // set where the image was divided by flats
   std::optional<MergeReport> merged;             // set where several frames were merged first
   std::optional<NoiseOrigin> noise;              // set where it is known where the noise model comes from
-  std::string clean_raw;                         // what the raw file that was written holds; empty for images
+  std::string clean_raw;                         // contents of the raw file that was written; empty for images
   bool skipped = false;                          // the outputs exist, and are kept
-  int width = 0;                                 // of the written image, upright
+  int width = 0;                                 // width of the written image, upright
   int height = 0;
   std::vector<isp::StageTime> times;  // all stages, in order
 };
@@ -43,7 +43,7 @@ std::string explain_text(const DevelopOutcome& outcome);
 std::string times_text(const std::vector<isp::StageTime>& times);
 
 /// Returns the metadata of a raw file and values measured on it: text for people, or one JSON object.
-/// @param noise  of the image as `develop` finds it; nullopt: none was found
+/// @param noise  noise of the image as `develop` finds it; nullopt: none was found
 std::string info_text(const std::string& file, const RawFrame& frame, const std::optional<NoiseOrigin>& noise);
 std::string info_json(const std::string& file, const RawFrame& frame, const std::optional<NoiseOrigin>& noise);
 std::string error_json(const std::string& file, const Error& error);

@@ -39,11 +39,12 @@ struct SceneArgs {
   double luminance_cd_m2 = 1;
   bool luminance_given = false;
   int stars = 0;
-  std::optional<double> star_luminance_cd_m2;  // of the faintest star; absent: a tenth of the scene's
+  std::optional<double> star_luminance_cd_m2;  // luminance of the faintest star; absent: a tenth of the scene's
   std::vector<LampArgs> lamps;
   int reduction = 1;  // generated scenes have so many samples for each pixel of --size and axis
 };
 
+/// Holds the arguments of `simulate`.
 struct SimulateArgs {
   SceneArgs scene;
   std::string output;  // NIGHT.dng; several frames are NIGHT_0000.dng...
@@ -57,7 +58,7 @@ struct SimulateArgs {
   capture::SyntheticOptions options;
   int frames = 1;
   BurstArgs burst;
-  std::string effects;  // as given; empty: auto, or all for published sampling
+  std::string effects;  // text of the option; empty: auto, or all for published sampling
   bool list = false;
   bool explain = false;
   bool force = false;

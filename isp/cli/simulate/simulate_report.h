@@ -40,7 +40,7 @@ std::string simulate_list_json();
 /// Returns the truth of a burst as JSON: size, options and, for each frame, its file, exposure time, motions and boxes
 /// of moving objects; then the points of frame 0. Positions are in pixels, integers at their centres; motions are those
 /// from frame 0 to the frame: what is at p is at centre + R (p - centre) + (dx, dy), R turning clockwise.
-/// @param files of the frames
+/// @param files files of the frames
 std::string burst_truth_json(const SimulateArgs& args, const capture::BurstSource& source,
                              const std::vector<std::string>& files);
 

@@ -44,7 +44,7 @@ struct Alignment {
   bool is_rigid = true;
   LocalMotion local;
   double variance_px2 = 0;
-  double search_variance_px2 = 0;  // of the motion that the search has found
+  double search_variance_px2 = 0;  // variance of the motion that the search has found
 
   LevelPair pair(std::size_t level) const {
     return {&reference.levels[level], &frame.levels[level], reference.variance_e2, frame.variance_e2, light};

@@ -26,9 +26,9 @@ class AlignReference {
 
 /// Limits of the motion that is searched for.
 struct AlignOptions {
-  int max_shift_px = 128;       // of the centre of the frame, along each axis
+  int max_shift_px = 128;       // largest displacement of the centre of the frame, along each axis
   double max_rotation_deg = 5;  // either way
-  int spacing_px = 32;          // of the nodes: 16, or a multiple
+  int spacing_px = 32;          // spacing of the nodes: 16, or a multiple
 };
 
 /// Returns the displacement of `frame` against the reference; both have the same size and phase. See

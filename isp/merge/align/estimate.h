@@ -18,7 +18,7 @@ struct DisplacementEstimate {
   SmallVector<N> value{};  // 0 in directions that are not determined
   SmallMatrix<N> covariance{};
   int determined = 0;     // number of these directions
-  double chi_square = 0;  // of the score against p = 0, with N degrees of freedom
+  double chi_square = 0;  // chi square of the score against p = 0, with N degrees of freedom
 };
 
 /// Returns the mean of p given the measurement s and a normal prior: with information K, variance M and prior

@@ -17,9 +17,9 @@ struct GlobalFit {
   bool is_rigid = true;     // only translation and rotation were fitted
   int determined = 0;       // number of directions of `step` that the tiles determine
   double inflation = 1;     // variance of the tiles' scores about the fit, in units of what noise explains; at least 1
-  double variance_px2 = 0;  // of a displacement along one axis, mean over the tiles
+  double variance_px2 = 0;  // variance of a displacement along one axis, mean over the tiles
   double largest_px = 0;    // change of displacement of any tile
-  double mean_square_px2 = 0;  // of the changes of displacement, for one axis
+  double mean_square_px2 = 0;  // mean square of the changes of displacement, for one axis
   double light_change = 0;     // by which the ratio of the frame's light to the reference's is larger
 };
 
@@ -28,7 +28,8 @@ struct GlobalFit {
 /// with a motion of their own lose their influence. Translation and rotation are always fitted; scale, shear and
 /// perspective, whose prior is normal with a standard deviation of 1 % of half the diagonal at the corner, as `model`
 /// says.
-/// @param undetermined_variance_px2  of directions of translation and rotation that the tiles do not determine
+/// @param undetermined_variance_px2  variance of the directions of translation and rotation that the tiles do not
+/// determine
 /// @param light  ratio of light that the tiles were measured with, and expected_light the one expected beforehand,
 ///               with a standard deviation of 5 %
 GlobalFit fit_global(const GlobalMotion& motion, const TileGrid& grid, const std::vector<TileFit>& fits,

@@ -10,7 +10,7 @@ namespace lowlux::merge {
 /// Departures of tiles from the global motion, in pixels, and the variance of each.
 struct LocalMotion {
   Motion departure;           // nodes of a grid
-  Plane<float> variance_px2;  // of a departure along one axis; 0 where there is none
+  Plane<float> variance_px2;  // variance of a departure along one axis; 0 where there is none
   bool any = false;
 };
 
@@ -28,8 +28,8 @@ void refer_to_global(const LocalMotion& local, const TileGrid& grid, std::vector
 /// if noise exceeds it with a probability of less than 1 % in any block of the frame, the block departs by the estimate
 /// of estimate() with a normal prior of one cell; else it stays. Within a block, tiles that contradict its departure
 /// lose their influence, so that a moving object does not displace its surroundings.
-/// @param fits  of the tiles, referred to the global motion
-/// @param step  of the global motion, to be added to the one that the tiles were measured with
+/// @param fits  fits of the tiles, referred to the global motion
+/// @param step  step of the global motion, to be added to the one that the tiles were measured with
 LocalMotion find_departures(const GlobalMotion& motion, const MotionStep& step, const TileGrid& grid,
                             const std::vector<TileFit>& fits);
 

@@ -36,7 +36,7 @@ class LumaLevel {
 /// Luma of a frame at all scales, finest level (cells of 2 x 2 pixels) first.
 struct LumaPyramid {
   std::vector<LumaLevel> levels;
-  double variance_e2 = 0;  // of a pixel without light: mean of the four sites
+  double variance_e2 = 0;  // variance of a pixel without light: mean of the four sites
   /// Returns the variance of a cell whose pixels have the expected value mean_e:
   ///     Var = (max(mean_e, 0) + variance_e2) / cell_px^2
   double variance_of(double mean_e, int cell_px) const {

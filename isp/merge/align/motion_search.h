@@ -89,7 +89,7 @@ class MotionComparison {
   Plane<float> constant_;  // the loss of a cell is constant - linear f + square f^2
   Plane<float> linear_;
   Plane<float> square_;
-  Plane<float> noise_loss_;  // what the noise of the frame adds to the loss on average
+  Plane<float> noise_loss_;  // mean increase of the loss by the noise of the frame
   double sum_of_noise_loss_ = 0;
   int cell_px_ = 2;
 };

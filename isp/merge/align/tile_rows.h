@@ -22,7 +22,7 @@ struct CellNoise {
   float steady_e2;  // variance at m = 0
   float min_mean_e;
   float warp_variance_cells;  // square of the expected error of the displacement, for each axis
-  float reference_slope;      // as slope and steady_e2, of light * reference alone
+  float reference_slope;      // slope and steady variance of light * reference alone
   float reference_steady_e2;
 };
 
@@ -37,7 +37,7 @@ enum TileSum : int {
   gradient_xx,  // g_x g_x of the reference [1/cell^2], which contains its noise
   gradient_xy,
   gradient_yy,
-  slope_xx,  // of the products of slopes of reference and frame, whose noise is independent [1/cell^2]
+  slope_xx,  // sums of products of slopes of reference and frame, whose noise is independent [1/cell^2]
   slope_xy,
   slope_yy,
   noise,        // variance of light * reference

@@ -16,7 +16,7 @@ namespace lowlux::merge {
 struct TileGrid {
   int columns = 0;
   int rows = 0;
-  int cells = 8;  // of a side of a tile
+  int cells = 8;  // side of a tile in cells
   int cell_px = 2;
   std::vector<std::array<float, rows::sums>> tiles;
 
@@ -50,7 +50,7 @@ void measure_tiles(const LevelPair& pair, const Motion& motion, double warp_erro
 struct TileFit {
   std::array<double, 2> score{};        // [1/px]
   std::array<double, 3> information{};  // xx, xy, yy [1/px^2], may be negative where there is only noise
-  std::array<double, 3> variance{};     // of the score [1/px^2]
+  std::array<double, 3> variance{};     // variance of the score [1/px^2]
 };
 
 /// Returns the fit of a tile. The information is the sum of products of slopes of reference and frame, in which noise

@@ -11,7 +11,7 @@ namespace lowlux::merge {
 /// Describes the background of a frame, its light without stars, at the centres of blocks of about 64 x 64 sites, after
 /// Bertin and Arnouts (A&AS 117, 1996). Between the centres it is interpolated bilinearly.
 struct Background {
-  std::vector<float> column_px;  // of the centres, rising
+  std::vector<float> column_px;  // columns of the centres, ascending
   std::vector<float> row_px;
   std::vector<PerSite<float>> level_e;  // rows x columns
   std::vector<PerSite<float>> per_std;  // 1 / standard deviation of a site, clutter included [1/e]

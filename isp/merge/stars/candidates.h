@@ -12,16 +12,17 @@ namespace lowlux::merge {
 struct Candidate {
   int x = 0;
   int y = 0;
-  float dx_px = 0;  // of the vertex of a parabola through the maximum and its neighbours
+  float dx_px = 0;  // offset of the vertex of a parabola through the maximum and its neighbours
   float dy_px = 0;
   float snr = 0;
 };
 
+/// Holds the input of find_candidates().
 struct CandidateSearch {
   const FrameView& frame;
   const Background& background;
   double psf_sigma_px;
-  double probability;  // of noise to exceed the limit at one site
+  double probability;  // probability that noise exceeds the limit at one site
 };
 
 /// Returns the taps of the matched filter from the centre outward, up to 3 sigma: the Gaussian integrated over pixels;

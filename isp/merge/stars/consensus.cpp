@@ -24,9 +24,9 @@ constexpr double number_of_tests = depths.size() * radii_px.size() * 2;
 double log10_binomial_tail(int n, double q, int m) {
   if (m <= 0) return 0;
   if (m > n) return -1e3;
-  double sum = 0;  // of terms relative to the first
+  double sum = 0;  // sum of terms relative to the first
   const auto log_factorial = [](int k) {
-    int sign = 0;  // of the gamma function: lgamma_r is the thread-safe form
+    int sign = 0;  // sign of the gamma function: lgamma_r is the thread-safe form
     return ::lgamma_r(k + 1.0, &sign);
   };
   const double first =

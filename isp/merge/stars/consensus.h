@@ -22,7 +22,7 @@ struct Consensus {
   int matched = 0;
   int in_view = 0;
   double log10_false_probability = 0;
-  double log10_rival_probability = 0;  // of the next best that is another one; 0 if there is none
+  double log10_rival_probability = 0;  // probability of the best different solution; 0 if there is none
 };
 
 /// Indices of a point of the reference and the point of the frame that is the same.
@@ -32,7 +32,7 @@ struct IndexPair {
 };
 
 /// Pairs each point of the frame with at most one of the reference, the closest, within a radius of its place.
-/// @param places  of the points of the reference in the frame
+/// @param places  places of the points of the reference in the frame
 /// @param radius_px  one for each place
 std::vector<IndexPair> pair_nearest(const std::vector<Point>& places, const std::vector<double>& radius_px,
                                     const PointGrid& frame);

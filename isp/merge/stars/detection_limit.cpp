@@ -67,7 +67,7 @@ double detection_limit(std::span<const float> taps, const PerSite<double>& mean_
                        double probability) {
   assert(probability >= 1e-12 && probability <= 0.1);
   const std::vector<Term> terms = terms_of(taps, mean_e, variance_e2);
-  double lower = 1e-3, upper = 1e-3;  // of s; the tail falls as s rises
+  double lower = 1e-3, upper = 1e-3;  // limits of s; the tail falls as s rises
   while (tail_at(cumulants_at(terms, upper), upper) > probability) upper *= 2;
   for (int i = 0; i < 40; ++i) {
     const double middle = (lower + upper) / 2;

@@ -12,9 +12,10 @@ namespace lowlux::merge {
 /// Y_i Poisson plus normal noise, whose cumulant generating function is
 ///     K(s) = sum of mean_i (exp(s c_i) - 1 - s c_i) + s^2 c_i^2 variance_i / 2,  c_i = g_i / std_i.
 /// Each tap counts as the mean of the four sites of a cell.
-/// @param taps        of the separable filter g from its centre outward; their squares, both sides counted, add up to 1
+/// @param taps        taps of the separable filter g from its centre outward; the sum of their squares over both sides
+/// is 1
 /// @param mean_e      background of each site, negative values count as 0
-/// @param variance_e2 of each site, in addition to its mean
+/// @param variance_e2 variance of each site, in addition to its mean
 /// @param probability 1e-12..0.1
 double detection_limit(std::span<const float> taps, const PerSite<double>& mean_e, const PerSite<double>& variance_e2,
                        double probability);

@@ -90,7 +90,7 @@ struct Drizzle::Target {
   const DrizzleFrame& frame;
   const InverseMotion& inverse;
   std::array<Plane<float>, 3>& sums;
-  int width;  // of the output
+  int width;  // width of the output
   DrizzleOptions options;
   PerSite<float> weight;
   RowBand band;

@@ -10,6 +10,7 @@
 
 namespace lowlux::merge {
 
+/// Holds the options of Drizzle.
 struct DrizzleOptions {
   double scale = 1;    // 1..3: output pixels for each pixel of the reference, each way
   double pixfrac = 1;  // 0.05..1: side of a drop in pixels of the frame
@@ -22,6 +23,7 @@ struct AcceptedBlocks {
   int block_px = 1;  // 1: one value for each pixel
 };
 
+/// Describes a frame that is drizzled.
 struct DrizzleFrame {
   FrameView frame;
   const Motion& motion;       // from the reference to this frame
@@ -40,7 +42,7 @@ struct DrizzleCounts {
 struct DrizzleImage {
   int width = 0;
   int height = 0;
-  std::array<Plane<float>, 3> rows;        // of each colour: a row of values, of weights and of variances, side by side
+  std::array<Plane<float>, 3> rows;        // rows of values, weights and variances of each colour, side by side
   std::array<double, 3> empty_fraction{};  // pixels without data
 
   /// Returns electrons per pixel area of the reference; 0 without data.
@@ -89,8 +91,8 @@ class Drizzle {
   int width_;
   int height_;
   std::array<Plane<float>, 3> sums_;         // sum a w y / A, sum a w and sum a^2 w^2 / A^2 of each output pixel
-  std::array<double, 3> variance_sum_e2_{};  // of variance_e2 w^2
-  std::array<double, 3> variance_weight_{};  // of w^2
+  std::array<double, 3> variance_sum_e2_{};  // sum of variance_e2 w^2
+  std::array<double, 3> variance_weight_{};  // sum of w^2
 };
 
 /// Returns how many times the noise of means over many output pixels exceeds what the variance of the pixels states, as

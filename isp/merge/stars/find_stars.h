@@ -6,6 +6,7 @@
 
 namespace lowlux::merge {
 
+/// Holds the options of find_stars().
 struct StarOptions {
   double psf_sigma_px = 1.2;      // 0.5..4: expected width of a star; a factor of 1.5 costs a tenth of the snr
   double false_stars_per_mp = 1;  // 1e-3..1e3: at most so many are expected in a frame of noise alone

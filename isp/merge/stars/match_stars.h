@@ -6,6 +6,7 @@
 
 namespace lowlux::merge {
 
+/// Holds the options of match_stars().
 struct MatchOptions {
   double max_scale_change = 0.02;             // 0..0.1
   double max_false_match_probability = 1e-6;  // 1e-30..0.1: that two unrelated lists are taken for the same stars

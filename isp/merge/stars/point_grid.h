@@ -31,7 +31,7 @@ class PointGrid {
   double top_ = 0;
   int columns_ = 1;
   int rows_ = 1;
-  std::vector<int> first_;  // of each cell, in order_
+  std::vector<int> first_;  // index of the first point of each cell, in order_
   std::vector<int> order_;
 };
 

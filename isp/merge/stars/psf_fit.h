@@ -24,7 +24,7 @@ struct PsfFit {
   double x_px = 0;
   double y_px = 0;
   double sigma_px = 0;
-  Matrix3 covariance{};            // of x, y [px] and ln sigma
+  Matrix3 covariance{};            // covariance of x, y [px] and ln sigma
   std::array<double, 3> flux_e{};  // R, G, B
   std::array<double, 3> flux_variance_e2{};
   std::array<double, 3> background_e{};

@@ -27,7 +27,7 @@ struct NotStars {
 
 /// Holds the stars of one frame.
 struct StarField {
-  int width = 0;  // of the frame
+  int width = 0;  // width of the frame
   int height = 0;
   std::vector<Star> stars;         // by decreasing snr
   double psf_sigma_px = 0;         // median width of the stars; 0 if there are none

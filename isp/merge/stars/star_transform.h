@@ -42,7 +42,7 @@ struct Similarity {
 /// a frame distorted by k, undistorted, moved by S, and distorted again, to first order in k.
 struct StarTransform {
   TransformModel model = TransformModel::similarity;
-  Point centre;  // of both frames
+  Point centre;  // centre of both frames
   double unit_px = 1;
   std::vector<double> coefficients;  // in the unit
   std::vector<double> covariance;    // row after row
@@ -56,7 +56,7 @@ struct StarTransform {
 struct StarPair {
   Point reference;
   Point frame;
-  double variance_px2 = 1;  // of the difference, for one axis
+  double variance_px2 = 1;  // variance of the difference, for one axis
 };
 
 /// A model fitted to pairs.

@@ -13,9 +13,10 @@ struct TrianglePair {
   std::array<int, 3> second{};
 };
 
+/// Holds the options of matching_triangles().
 struct TriangleOptions {
   double max_scale_change = 0.02;
-  double tolerance = 0.004;   // of ratios of sides, in addition to...
+  double tolerance = 0.004;   // tolerance of ratios of sides, in addition to...
   double place_error_px = 1;  // ...this divided by the longest side
 };
 

@@ -26,7 +26,7 @@ using ReceptorMatrix = std::array<Vector3, 4>;
 
 /// Returns Smith and Pokorny's cones and a row of rods that is 1 for (1, 1, 1).
 /// @param to_xyz       columns: XYZ of the primaries; identity for XYZ itself with `white` in place of (1, 1, 1)
-/// @param rod_weights  of X, Y and Z in scotopic luminance; the primaries' white must not be dark to the rods
+/// @param rod_weights  weights of X, Y and Z in scotopic luminance; the primaries' white must not be dark to the rods
 /// @param white        in the primaries
 ReceptorMatrix cao_receptors(const Matrix3& to_xyz, const Vector3& rod_weights, const Vector3& white = {1, 1, 1});
 

@@ -42,12 +42,13 @@ enum class EntropyVariant : std::uint8_t { rendering, thesis };
 /// bright to be any spectrum.
 enum class PixelPower : std::uint8_t { lifted, luminance };
 
+/// Holds the options of the model of largest entropy.
 struct EntropyOptions {
   EntropyVariant variant = EntropyVariant::rendering;
   ConeSet cones = ConeSet::stockman_sharpe_2000;
   PixelPower power = PixelPower::lifted;
   std::optional<double> gamma_fixed;        // 2 is the thesis' run without adaptation (Table 5-2)
-  std::optional<Matrix3> noise_covariance;  // of X, Y and Z as in ColourNoise; absent: without noise
+  std::optional<Matrix3> noise_covariance;  // noise covariance of X, Y and Z as in ColourNoise; absent: without noise
 };
 
 /// Returns the weight of entropy, gamma = 2 (1 - m), at least 1e-4; m in 0..1 as in mesopic.h.
@@ -77,7 +78,8 @@ Result<EntropyModel> entropy_model(double m, const NodePower& white, const Entro
 Vector3 entropy_moments(const EntropyModel& model, const NodePower& power);
 
 /// Returns the fitted spectrum from responses to a light of power 1; nullopt as fit_max_entropy.
-/// @param luminance_variance  of the noise of the integral of V p; 0 where the model has no covariance
+/// @param luminance_variance  luminance variance of the noise of the integral of V p; 0 where the model has no
+/// covariance
 std::optional<MaxEntropyFit<3>> entropy_fit(const EntropyModel& model, const Vector3& eta,
                                             double luminance_variance = 0);
 
@@ -99,7 +101,7 @@ Matrix3 response_matrix(const SpectralBasis<3>& basis);
 
 /// Describes the noise of one pixel and the camera's colour matrix.
 struct ChannelNoise {
-  Vector3 variance_e2;         // of R, G, B
+  Vector3 variance_e2;         // variances of R, G, B
   Vector3 rgb_per_e{1, 1, 1};  // camera RGB of an electron: gains of white balance and exposure
   Matrix3 camera_to_xyz = identity3();
 };

@@ -14,7 +14,7 @@ struct GamutMapped {
 /// the largest t in 0..1. Luminance and direction of chroma are kept. A luminance of 0 or less gives
 /// black, one of 1 or more white, the only colours of that luminance or nearest to it. Pictures for other displays are
 /// mapped so, as luminance is what their models predict; photographs keep their colour instead (`RgbTransform`).
-/// @param luminance_weights  of R, G and B; they sum to 1
+/// @param luminance_weights  weights of R, G and B; they sum to 1
 GamutMapped toward_white(const Vector3& rgb, const Vector3& luminance_weights);
 
 }  // namespace lowlux::isp

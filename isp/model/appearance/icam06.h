@@ -8,11 +8,13 @@ namespace lowlux::isp {
 // The tone compression of iCAM06 (Kuang, Johnson & Fairchild 2007; thesis Eq. 2.19 to 2.21 with a separate channel in
 // each row and the fourth power of (1 - j^2)).
 
+/// Lists the paper and the authors' program, which differ.
 enum class Icam06Variant : std::uint8_t {
   paper,
-  icam06_matlab_compat,  // as the authors' program: s^3 for s^0.3 in B_S, + 0.03 for + 0.3 in A_s, S_w = 5 L_A
+  icam06_matlab_compat,  // like the authors' program: s^3 for s^0.3 in B_S, + 0.03 for + 0.3 in A_s, S_w = 5 L_A
 };
 
+/// Holds the state of adaptation of iCAM06.
 struct Icam06State {
   double white_cd_m2 = 0;           // Y_w > 0; L_A is a fifth of it
   double scotopic_white_cd_m2 = 0;  // S_w > 0

@@ -17,6 +17,7 @@ enum class ShinMatrix : std::uint8_t { exact, published };
 /// back afterwards. The equations themselves assume the equal-energy white.
 enum class ShinAdaptation : std::uint8_t { to_white, none };
 
+/// Holds the state of adaptation of Shin's model.
 struct ShinObserver {
   Xyz white{0.95047, 1.0, 1.08883};  // the scene's white, Y = Y_w > 0; must excite all cones and rods
   double rod_white = 0.784;          // K'_w / K_w, with K_w = Y_w

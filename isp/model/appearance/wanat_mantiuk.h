@@ -17,7 +17,7 @@ double wanat_exponent(double from_cd_m2, double to_cd_m2);
 /// Returns R_i = Y (R_i / Y)^exponent for each of R, G, B, scaled back to the original luminance. Components below 0
 /// are multiplied by the exponent (at most 1) instead; colours of negative luminance are treated as the negative of
 /// their opposites, those of luminance 0 as black.
-/// @param luminance_weights  of R, G and B, positive
+/// @param luminance_weights  weights of R, G and B, positive
 Vector3 wanat_saturated(const Vector3& rgb, double exponent, const Vector3& luminance_weights);
 
 /// Returns the model as a map: saturation of linear Rec.709 (white adapted to D65 and back) at the luminance of

@@ -30,7 +30,7 @@ Result<ColourCalibration> fit_calibration(const std::array<Spectrum, 3>& sensiti
 /// Holds the matrix of thesis Eq. 4.14, computed from spectra alone, and its condition number.
 struct SpectralMatrix {
   Matrix3 camera_to_xyz;
-  double condition_number;  // of C T^t, in the 2-norm
+  double condition_number;  // condition number of C T^t, in the 2-norm
 };
 
 /// Returns M = (T T^t) (C T^t)^-1 with T the CIE 1931 colour-matching functions and C the sensitivities, both at the

@@ -64,7 +64,7 @@ std::optional<ChromaticityCloud> propagated_cloud(const Xyz& mean, const Matrix3
 std::optional<ChromaticityCloud> predicted_cloud(const PhotonMeans& means);
 
 /// Returns the XYZ of counted photons: sum of X_i (h c / lambda_i) v_i, in units of 1e-19 J.
-/// @param counts  of the bins of `means`, as many
+/// @param counts  counts of the bins of `means`, as many
 Xyz xyz_of_photons(const PhotonMeans& means, std::span<const double> counts);
 
 }  // namespace lowlux::isp

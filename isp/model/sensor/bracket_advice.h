@@ -15,15 +15,16 @@ struct BracketScene {
   double darkest_e = 0;           // mean signal that 90 % of the scene exceeds
   bool darkest_is_black = false;  // the raw does not show the darkest tenth; darkest_e is what it would just show
   double dark_charge_e = 0;       // mean, in this exposure; grows with the time
-  double noise_variance_e2 = 0;   // of reading and quantisation
+  double noise_variance_e2 = 0;   // noise variance of reading and quantisation
   double saturation_e = 0;        // charge up to which a merge uses a pixel fully, dark charge included
   double highlight_fraction = 0;  // charge of the brightest lamps over that limit in their channel; may be above 1
   double saturated_fraction = 0;  // fraction of the pixels beyond that limit
 };
 
+/// Holds the input of advise_bracket().
 struct BracketRequest {
   BracketScene scene;
-  double snr = 100;  // that the darkest tenth is to reach, a ratio of powers (isp/model/sensor/noise_budget.h)
+  double snr = 100;  // required ratio of powers in the darkest tenth (isp/model/sensor/noise_budget.h)
   double longest_exposure_s = std::numeric_limits<double>::infinity();
 };
 
@@ -33,10 +34,11 @@ struct BracketExposure {
   int frames = 1;
 };
 
+/// Holds the proposed frames of a merge.
 struct BracketAdvice {
   std::vector<BracketExposure> exposures;  // shortest first; several are a bracket
-  double snr = 0;                          // of the darkest tenth in the merged raw, a ratio of powers
-  double raw_snr = 0;                      // of the darkest tenth in the raw itself
+  double snr = 0;                          // ratio of powers in the darkest tenth of the merged raw
+  double raw_snr = 0;                      // signal-to-noise ratio of the darkest tenth in the raw itself
   double frames_like_raw = 0;              // frames of its exposure that would reach the requested ratio; whole
   double highlight_exposure_s = 0;         // in which the brightest lamps reach the limit of saturation
   double shadow_exposure_s = 0;            // in which a single frame shows the darkest tenth with the requested ratio

@@ -14,7 +14,7 @@ namespace lowlux::isp {
 
 /// Describes a camera at one gain setting, behind its lens and under the light of the scene.
 struct GainSetting {
-  std::string name;  // as the camera names it
+  std::string name;  // name that the camera uses
   SensorModel sensor;
   Vector3 white_e_per_s{};  // electrons of R, G and B for a neutral of 1 cd/m2
 };
@@ -27,7 +27,7 @@ struct AdviceRequest {
   double highlight_cd_m2 = 0;      // luminance that must not clip
   double clipped_share = 1e-3;     // fraction of pixels of the highlight that noise may clip, 1e-9..0.5
   double longest_exposure_s = 0;   // longest exposure without motion blur, see motion_limit_s
-  double temperature_c = 20;       // of the sensor
+  double temperature_c = 20;       // temperature of the sensor
   double patch_pixels = 256;  // pixels of the patch whose chromaticity is evaluated: of R and of B, twice as many of G
   int frames = 1;             // frames of equal exposure, averaged
   int curve_points = 25;      // exposure times of the curve, 2..10000
@@ -53,9 +53,9 @@ enum class NoiseSource : std::uint8_t { photons, dark_current, read_noise, quant
 
 /// Describes the quality of the mid tone in an averaged pixel, and in a patch of them.
 struct MidtoneQuality {
-  double snr = 0;     // of the channel with most signal, a ratio of powers (isp/model/sensor/noise_budget.h)
-  double uv_std = 0;  // of the patch's u'v', root of the summed variances: the bound (isp/model/colour/chroma_bound.h)
-  double weight_snr = 0;  // of the patch; below about 5 the chromaticity scatters with heavy tails
+  double snr = 0;         // ratio of powers in the channel with most signal (isp/model/sensor/noise_budget.h)
+  double uv_std = 0;      // bound of the patch's u'v', root of summed variances (isp/model/colour/chroma_bound.h)
+  double weight_snr = 0;  // ratio of the patch; below about 5 the distribution of the chromaticity has heavy tails
 };
 
 /// Describes one exposure at one gain.
@@ -76,9 +76,10 @@ struct GainAdvice {
   double largest_noise_fraction = 0;  // fraction of the mid tone's variance, in its channel with most signal
 };
 
+/// Holds the best exposure of each gain, and the best gain.
 struct ExposureAdvice {
   std::size_t best = 0;           // index in gains
-  std::vector<GainAdvice> gains;  // as many as, and in the order of, AdviceRequest::gains
+  std::vector<GainAdvice> gains;  // one for each of AdviceRequest::gains, in the same order
   std::vector<AdvicePoint>
       curve;           // gain by gain, exposures rising in equal ratios from a tenth of the shortest advised
   std::string reason;  // reason in one sentence without a final full stop
@@ -94,12 +95,12 @@ double decibel(double snr);
 /// chromaticity. Both improve with the exposure, so that each gain is evaluated at its longest: the smallest of
 /// longest_exposure_s and the times in which the highlight's charge m = (signal + dark) t reaches
 ///     m + z sqrt(m) = full well,  m + z sqrt(m + sigma_r^2) = charge at the largest code,
-/// with z the normal quantile of 1 - clipped_share. The best gain is the one whose larger loss is smallest: of SNR [dB]
-/// against the best SNR of all gains, and of 20 log10 of the chromaticity's standard deviation against the smallest of
-/// all gains. Noise is that of photons, dark current, reading and quantisation; fixed pattern, row and column noise are
-/// not included.
-/// Errors: no gains; an impossible sensor or figure; a highlight darker than the mid tone; no light; a mid tone without
-/// chromaticity; a highlight that clips in any time. The message says which, and what would help.
+/// with z the normal quantile of 1 - clipped_fraction. The best gain is the one whose larger loss is smallest: of SNR
+/// [dB] against the best SNR of all gains, and of 20 log10 of the chromaticity's standard deviation against the
+/// smallest of all gains. Noise is that of photons, dark current, reading and quantisation; fixed pattern, row and
+/// column noise are not included. Errors: no gains; an impossible sensor or figure; a highlight darker than the mid
+/// tone; no light; a mid tone without chromaticity; a highlight that clips in any time. The message says which, and
+/// what would help.
 Result<ExposureAdvice> advise_exposure(const AdviceRequest& request);
 
 /// Returns the model's prediction for one setting, whether a limit allows it or not. `request` must be one that
@@ -111,7 +112,7 @@ Result<void> check_request(const AdviceRequest& request);
 
 /// Returns the reason for the best gain: the limit of its exposure, the losses of its neighbours, and the main
 /// component of its noise. One sentence without a final full stop.
-/// @param losses_db  of each gain against the best of all [dB]
+/// @param losses_db  losses of each gain against the best of all [dB]
 std::string advice_reason(const AdviceRequest& request, const ExposureAdvice& advice,
                           const std::vector<double>& losses_db);
 

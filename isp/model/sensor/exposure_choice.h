@@ -30,29 +30,31 @@ struct GainStep {
 /// Holds what a frame shows of the light, for a pixel of the channel with most signal.
 struct MeteredLight {
   double midtone_e_per_s = 0;    // where the signal-to-noise ratio is evaluated; 0 and below count as just above 0
-  double highlight_e_per_s = 0;  // which must not clip
+  double highlight_e_per_s = 0;  // rate that must not clip
 };
 
 /// Holds the limits of an exposure.
 struct ExposureLimits {
   ExposureTimes times;
   double longest_s = 0;                                         // by motion blur and frame rate
-  double max_factor = std::numeric_limits<double>::infinity();  // of the gains; the lowest gain is used in any case
+  double max_factor = std::numeric_limits<double>::infinity();  // largest gain; the lowest gain is always allowed
   Mains mains = Mains::off;
   /// Upper limit of the fraction of clipped pixels, 1e-9..0.5: so many pixels of the fullest channel may exceed, noise
   /// included, the full well or the range without metering_headroom. Of all pixels fewer clip.
   double clipped_fraction = 1e-3;
-  double temperature_c = 20;  // of the sensor, for its dark current
+  double temperature_c = 20;  // temperature of the sensor, for its dark current
 };
 
+/// Holds an exposure time and a gain of a camera.
 struct ExposureSetting {
   double exposure_s = 0;
   std::size_t gain = 0;  // index in the gains of the camera
 };
 
+/// Holds a setting and the signal-to-noise ratio that is predicted for it.
 struct ExposureChoice {
   ExposureSetting setting;
-  double snr = 0;  // of the mid tone, a ratio of powers (isp/model/sensor/noise_budget.h)
+  double snr = 0;  // signal-to-noise ratio of the mid tone, a ratio of powers (isp/model/sensor/noise_budget.h)
   ExposureLimit limit = ExposureLimit::motion;
   bool clips = false;  // the highlight clips in the shortest exposure, too
 };

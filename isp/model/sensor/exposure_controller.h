@@ -14,7 +14,7 @@ struct MeteredCodes {
   /// Code that ExposureLimits::clipped_fraction of the pixels of the fullest channel exceed, noise included.
   double highlight_dn = 0;
   double range_dn = 0;          // white less black
-  double clipped_fraction = 0;  // of the pixels, in the channel with most: codes of white or above
+  double clipped_fraction = 0;  // fraction of the pixels with codes of white or above, in the channel with most
 };
 
 /// States how a frame was exposed.
@@ -40,13 +40,13 @@ class ExposureController {
   struct Setup {
     std::vector<GainStep> gains;  // at least one, by rising factor
     ExposureLimits limits;
-    ExposureSetting at;      // that the camera has
+    ExposureSetting at;      // setting of the camera
     int latency_frames = 8;  // frames after which a setting is in effect at the latest
   };
   explicit ExposureController(Setup setup);
 
   /// Takes one frame. Returns the setting to be made, if the camera should have another one.
-  /// @param stated  of this frame, if the camera states it; its effect is then awaited no longer than necessary
+  /// @param stated  setting of this frame if the camera states it, which shortens the wait for a change
   std::optional<ExposureSetting> take(const MeteredCodes& codes, const std::optional<StatedExposure>& stated);
 
   /// Takes what the camera made of the time that was asked for: where it is another one, that is a limit from now on.
@@ -74,7 +74,7 @@ class ExposureController {
     MeteredLight light;
     bool clips = false;
     double highlight_e = 0;    // in the frame, with noise
-    double white_e_per_s = 0;  // that would fill the range
+    double white_e_per_s = 0;  // rate that fills the range
     double exposure_s = 0;
   };
   bool is_awaited(const std::optional<StatedExposure>& stated);

@@ -38,7 +38,7 @@ double count_change_variance_e2(double less_e, double more_e, double step_e);
 struct BlockNoise {
   double variance_e2 = 0;  // variance of a pixel, all effects
   double signal_e = 0;     // mean, and variance of its photon noise
-  double pixels = 0;       // that are neither full nor black
+  double pixels = 0;       // number of pixels that are neither saturated nor black
   double step_e = 0;       // charge of a code
   double floor_e2 = 0;     // changes of variance below this do not count
 };
@@ -48,7 +48,7 @@ struct BlockNoise {
 struct MovedChange {
   double scatter_e = 0;
   double relative_variance = 0;
-  double sigmas = bound_sigmas;  // of the noise of the block's mean, next to so rare a change
+  double sigmas = bound_sigmas;  // bound in standard deviations of the noise of the block's mean
 };
 
 /// Predicts the change of channel `c` by light that moves. The bounds are five standard deviations, weighted by the

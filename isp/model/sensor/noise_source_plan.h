@@ -36,6 +36,7 @@ inline constexpr int effect_count = 14;
 /// Returns "photon-noise", "dark-current"... in the order of Effect.
 std::span<const std::string_view> effect_names();
 
+/// Holds a set of noise sources.
 class NoiseSourceSet {
  public:
   constexpr NoiseSourceSet() = default;
@@ -143,7 +144,7 @@ struct NoiseSourcePlan {
 
 /// Decides by the closed forms. Blocks whose levels or glow differ by decades are different regions; in each, effects
 /// are left out smallest first as long as all that is left out together is predicted to stay below the tolerance.
-/// @param blocks of the frame, row by row; not empty
+/// @param blocks blocks of the frame, row by row; not empty
 NoiseSourcePlan plan_noise_sources(const SensorModel& sensor, const Exposure& exposure, const Developing& developing,
                                    std::span<const BlockLevel> blocks, const Tolerance& tolerance);
 

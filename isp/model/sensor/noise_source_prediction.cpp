@@ -25,7 +25,7 @@ struct Charge {
   const MovedLight* moved;  // what is left out, of all channels
   double shift;             // mean of what is left out
   double clipped;           // mean of its size where pixels saturate, else 0
-  Contrast contrast;        // of all channels; 0 where pixels saturate
+  Contrast contrast;        // contrast of all channels; 0 where pixels saturate
 
   double level() const { return signal + dark + glow; }  // of all pixels but the hot ones
 };

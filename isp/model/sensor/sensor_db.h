@@ -46,7 +46,7 @@ struct SensorFigures {
 /// Describes a sensor by name, complete enough to be simulated, with the figures that had to be assumed.
 struct NamedSensor {
   SensorModel model;
-  std::string gain_setting;  // as the source names it; may be empty
+  std::string gain_setting;  // name that the source uses; may be empty
   std::string source;        // source of the figures
   std::string camera;        // camera whose spectral sensitivities are used, see camera_sensitivity()
   std::optional<double> pixel_pitch_um;

@@ -12,7 +12,7 @@ namespace lowlux::isp {
 template <std::size_t N>
 struct SpectralBasis {
   std::vector<std::array<double, N>> f;
-  std::vector<double> weight_nm;  // as many as f
+  std::vector<double> weight_nm;  // one for each f
 };
 
 /// Holds the spectrum of largest entropy with given moments, p = exp(<f, theta> - psi), integral 1.

@@ -20,6 +20,7 @@ enum class SpectrumSet : std::uint8_t {
   munsell_ten,       // ten reflectances of the thesis' Table 3-1, 1 nm: "5R_4_14"...
 };
 
+/// Holds a spectrum and its name.
 struct NamedSpectrum {
   std::string_view name;
   Spectrum spectrum;

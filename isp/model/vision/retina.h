@@ -98,7 +98,7 @@ struct ReceptorField {
   double counts_per_cd_m2 = 0;  // mean isomerisations by light: per scotopic cd/m2 for rods
   double dark_counts = 0;       // mean isomerisations without light
 };
-/// @param area_deg2  of the field
+/// @param area_deg2  area deg2 of the field
 ReceptorField rods_in(double area_deg2, double pupil_mm2);
 ReceptorField cones_in(double area_deg2, double pupil_mm2);
 

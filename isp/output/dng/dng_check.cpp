@@ -16,7 +16,7 @@ constexpr double max_level_dn = 65535;
 constexpr double max_float_level_dn = 4294967295.0;  // WhiteLevel is an integer of up to 32 bits
 constexpr std::size_t max_values = 65535;            // libtiff counts the values of these tags in 16 bits
 constexpr double largest_coefficient =
-    1000;  // of a matrix or gain: above it no camera is plausible, and rationals are too coarse
+    1000;  // largest value of a matrix or gain: larger ones are implausible, and rationals are too coarse
 constexpr double smallest_coefficient = 1e-9;  // rationals hold 4.7e-10 as the least, and libtiff rounds below to 0
 constexpr double smallest_gain = 1e-4;
 

@@ -10,11 +10,13 @@
 
 namespace lowlux::isp {
 
+/// Lists the compressions of samples.
 enum class DngCompression : std::uint8_t {
   none,
   lossless,  // lossless JPEG of 16-bit samples in tiles; Deflate of floats
 };
 
+/// Holds the options of write_dng().
 struct DngWriteOptions {
   Overwrite overwrite = Overwrite::no;
   std::string software = "lowlux";  // with its version; replaces the name in the frame

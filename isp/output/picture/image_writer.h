@@ -33,6 +33,7 @@ bool supported(FileFormat format, SampleType type);
 /// Checks in advance that the format holds the samples, and that floats are scene-linear.
 Result<void> check_writable(FileFormat format, SampleType type, OutputSpace space);
 
+/// Holds the options of write_picture().
 struct WriteOptions {
   Overwrite overwrite = Overwrite::no;
   Sync sync = Sync::no;

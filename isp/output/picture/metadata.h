@@ -16,7 +16,7 @@ struct ExifPicture {
   int height = 0;
   OutputSpace space = OutputSpace::srgb;
   std::string software;                     // producer of the image, e.g. "lowlux 0.1.0"
-  const SourceTags* source_tags = nullptr;  // of the raw file; tags that the block has stay as they are
+  const SourceTags* source_tags = nullptr;  // tags of the raw file; they do not replace tags that the block has
 };
 
 /// Returns an EXIF 2.32 block from its TIFF header on (little-endian). What is absent in `info` stays absent;

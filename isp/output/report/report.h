@@ -23,6 +23,7 @@ struct Series {
   Mark mark = Mark::line;
 };
 
+/// Describes a plot of a report.
 struct Plot {
   std::string id;  // letters, digits, - and _: name of the CSV file
   std::string title;
@@ -37,6 +38,7 @@ struct Plot {
       false;  // names of series of one point are drawn next to it, in bold where a line passes through; no legend
 };
 
+/// Holds a table of a report.
 struct Table {
   std::vector<std::string> columns;
   std::vector<std::vector<std::string>> rows;  // each as long as columns
@@ -56,6 +58,7 @@ struct Comparison {
   ComparedPicture after;
 };
 
+/// Holds a section of a report.
 struct ReportSection {
   std::string title;
   std::string text;  // one paragraph per line
@@ -65,6 +68,7 @@ struct ReportSection {
   bool is_part = false;  // part of the previous section: a smaller heading, not in the contents
 };
 
+/// Holds a report: one page, or its tables and plots as CSV.
 struct Report {
   std::string title;
   std::string text;  // one paragraph per line
@@ -82,6 +86,7 @@ std::string csv_of(const Table& table);
 /// Returns one line for each point: series, x, y, with all digits; y is empty where it is not finite.
 std::string csv_of(const Plot& plot);
 
+/// Holds the name and the content of a file.
 struct TextFile {
   std::string path;
   std::string_view text;

@@ -23,7 +23,7 @@ struct Tile {
 struct Axis {
   int cells;
   int tiles;
-  int blocks;  // of the thumbnail
+  int blocks;  // number of blocks of the thumbnail
 
   int tile_of_block(int block) const {
     return denoise::tile_of(static_cast<int>((block + 0.5) / blocks * cells), tiles);
@@ -70,14 +70,14 @@ std::vector<Tile> tiles_of(const Axis& across, const Axis& down, const CameraRgb
   return out;
 }
 
-/// @param side  of a cell [px]
+/// @param side  side of a cell [px]
 double ratio_of_tile(const RawFrame& frame, const Axis& across, const Axis& down, int side, int index) {
   const int x = index % across.tiles, y = index / across.tiles;
   return view_of(frame.noise_ratio.get())
       .mean(side * denoise::tile * x, side * denoise::tile * y, side * across.cells_of(x), side * down.cells_of(y));
 }
 
-/// @param side  of a cell [px]
+/// @param side  side of a cell [px]
 ChromaWork work_of_cells(const RawFrame& frame, const CellNoise& cell, int side, const Thumbnail& thumbnail) {
   const denoise::RawNoise& noise = cell.noise;
   const double dark_e = mean_of_sites(noise.dark_mean_e), variance_e2 = mean_of_colours(noise.variance_e2);

@@ -19,7 +19,7 @@ struct ChromaWork {
 
 /// Predicts what denoise/spatial/chroma_start.h decides, from the means of a thumbnail's blocks. Precondition:
 /// levels.electrons_at_white.
-/// @param noise  of the frame, its dark charge included
+/// @param noise  noise of the frame, its dark charge included
 ChromaWork chroma_work(const RawFrame& frame, const RawLevels& levels, const denoise::RawNoise& noise,
                        const Thumbnail& thumbnail);
 

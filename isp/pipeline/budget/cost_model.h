@@ -60,7 +60,7 @@ constexpr bool is_denoising(CostPart part) { return part >= CostPart::draft_0 &&
 struct CostSize {
   double megapixels = 0;
   double denoised_megapixels = 0;       // with the denoiser's padding and the overlaps of tiles of a large frame
-  double more_for_best_megapixels = 0;  // what the larger overlaps of Level::best add
+  double more_for_best_megapixels = 0;  // additional size by the larger overlaps of Level::best
 
   /// Returns the size that the time of a part grows with.
   double megapixels_of(CostPart part) const;

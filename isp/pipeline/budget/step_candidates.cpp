@@ -63,7 +63,7 @@ void add_output(const StepFacts& facts, const StepCandidate& plan, std::vector<C
 struct PixelRatios {
   double planning;
   double floats;  // rendering without noise reduction
-  double check;   // of the noise of the part that is checked, in addition to the check of a mosaic
+  double check;   // time of checking the noise, in addition to that of a mosaic
   double cells;   // making cells, and pixels of them again
 };
 PixelRatios pixel_ratios(int planes) {

@@ -18,7 +18,7 @@ namespace lowlux::isp {
 /// tuning images, which others may exceed by a little.
 constexpr double fraction_for_level = 0.9;
 
-/// Holds the visible noise of a frame, and what levels leave of it: seen_percentile() over its blocks.
+/// Holds the visible noise of a frame, and what levels leave of it: visible_percentile() over its blocks.
 struct LevelNoise {
   double all = 0;
   std::array<double, denoise::all_levels.size()> left{};  // by each level, relative to Level::high
@@ -48,8 +48,8 @@ struct StepFacts {
   StepSizes sizes;
   std::vector<SeenBlock> blocks;
   bool noise_by_ratio = false;  // a frame that is not a mosaic: its level follows from its signal-to-noise ratio
-  int pixel_planes = 0;         // of a frame that is not a mosaic: 1 or 3; 0 for mosaics
-  double checked_fraction = 1;  // of a frame that is not a mosaic: see pixel_noise.h
+  int pixel_planes = 0;         // planes of a frame that is not a mosaic, 1 or 3; 0 for mosaics
+  double checked_fraction = 1;  // fraction of a frame that is checked, if it is not a mosaic: see pixel_noise.h
   bool has_noise = false;       // the noise is known, and may be reduced
   LevelNoise noise;
   ChromaWork chroma;

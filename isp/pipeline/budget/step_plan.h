@@ -22,7 +22,7 @@ struct PlannedStep {
   double size = 0;  // CIEDE2000 that omitting it would change; not a number where that is not known
   double left = 0;  // CIEDE2000 that the decision leaves of it, relative to everything; not a number if not known
   bool used = true;
-  std::string decision;           // as text
+  std::string decision;           // explanation
   std::optional<double> seconds;  // time it is predicted to take, or would; excludes the work common to all plans
 };
 
@@ -33,7 +33,7 @@ struct StepPlan {
   bool lines = true;                  // row and column noise is subtracted with the noise
   bool dark = true;
   bool display = true;
-  DemosaicMethod max_demosaic = DemosaicMethod::residual_median;  // that there is time for
+  DemosaicMethod max_demosaic = DemosaicMethod::residual_median;  // most expensive method that fits into the time
   std::optional<denoise::Level> level;
   bool level_decided = false;           // false: noise is reduced as the options state
   std::optional<NoiseRegions> regions;  // regions with levels of their own

@@ -49,7 +49,7 @@ class Display {
   Lab lab(const Vector3& camera) const { return lab_of_shown(shown(camera)); }
 
   /// Returns the colour of the mean of pixels that scatter and are clipped at black.
-  /// @param std  of each colour, a fraction of white
+  /// @param std  standard deviation of each colour, a fraction of white
   Lab lab_of_clipped(const Vector3& camera, const Vector3& std) const {
     const Vector3 mean = linear(camera);
     Vector3 raised{};
@@ -217,7 +217,7 @@ class Charge {
     return out;
   }
 
-  /// Returns SeenBlock::surroundings.
+  /// Returns VisibilityBlock::surroundings.
   /// @param reach  in blocks
   double surroundings(int x, int y, int reach) const {
     double sum = 0;

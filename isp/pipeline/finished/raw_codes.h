@@ -40,9 +40,9 @@ inline SampleLevels float_levels() { return {.is_float = true}; }
 /// SensorLayout::linear_rgb, with the figures of R, G and B at sites 0, 1 and 2.
 struct SignalToEncode {
   PlaneView<const float> signal_e;
-  PlaneView<const float> charge_e;       // as large: a pixel is saturated from saturation_e of its colour on
-  std::array<double, 3> saturation_e{};  // of R, G, B
-  PerSite<double> signal_at_white_e{};   // of a white pixel
+  PlaneView<const float> charge_e;  // charge, of equal size: a pixel is saturated from saturation_e of its colour on
+  std::array<double, 3> saturation_e{};  // saturation levels of R, G, B
+  PerSite<double> signal_at_white_e{};   // signal of a white pixel
   PerSite<double> charge_at_white_e{};
 };
 

@@ -54,7 +54,7 @@ struct SquareDetail {
   std::array<double, 2> detail{};
 };
 
-/// @param side  of the smaller squares [px]
+/// @param side  side of the smaller squares [px]
 SquareDetail detail_at(const RgbView<const float>& xyz, int x, int y, int side) {
   const Vector3 white = vector_of(*xyz_of(white_d65));
   const double sum_of_white = white[0] + white[1] + white[2];

@@ -10,7 +10,7 @@ namespace lowlux::isp {
 
 /// Describes how the colours of a finished image are restored.
 struct ResaturateOptions {
-  Xyz black;                           // what the image shows where there is no light; white is Y = 1
+  Xyz black;                           // colour of the image where there is no light; white is Y = 1
   std::optional<double> chroma_noise;  // denoise::Resaturation::chroma_noise; absent: measured
   double prior_std = 0.065;            // denoise::Resaturation::prior_std
   int radius = 4;                      // denoise::Resaturation::radius
@@ -18,6 +18,7 @@ struct ResaturateOptions {
   SampleType samples = SampleType::u8;
 };
 
+/// Holds an image with restored colours.
 struct Resaturated {
   Picture picture;
   double chroma_noise = 0;

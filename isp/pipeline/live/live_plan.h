@@ -27,7 +27,7 @@ struct LiveSetup {
   std::vector<Pixel> defects;  // defects of the active area, ascending
   ToneCurve tone = ToneCurve::standard;
   SampleType samples = SampleType::u8;
-  LookChoice look;                                 // that of the eye or the camera
+  LookChoice look;                                 // look of the eye or of the camera
   bool levels = true;                              // frames may be denoised one by one, up to `most`
   denoise::Level most = denoise::Level::standard;  // highest level of frames denoised one by one
   bool temporal = false;                           // previous frames take part
@@ -66,7 +66,7 @@ struct LiveFacts {
   std::optional<Matrix3> colour_matrix;         // white-balanced camera RGB to linear sRGB, in place of calibrations
   std::optional<double> exposure_ev;            // absent: automatic
   double saturation = 1;                        // saturation of the image's colours, 0..4
-  DemosaicMethod max_demosaic = DemosaicMethod::residual_median;  // that there is time for
+  DemosaicMethod max_demosaic = DemosaicMethod::residual_median;  // most expensive method that fits into the time
   bool follows = true;  // the previous frame; false forgets previous frames and their noise
   LiveDenoise denoise;
 };

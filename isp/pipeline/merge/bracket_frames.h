@@ -60,7 +60,7 @@ class BracketFrames {
   Plane<std::uint8_t> least_matches_;  // blocks
   double least_light_ = 1;
   bool is_aligned_ = true;         // the displacement of that frame is known
-  PerSite<double> variance_e2_{};  // of that frame without light
+  PerSite<double> variance_e2_{};  // variance of that frame without light
 };
 
 }  // namespace lowlux::isp

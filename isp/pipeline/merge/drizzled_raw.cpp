@@ -109,7 +109,7 @@ Rect scaled_crop(const Rect& crop, double scale, const RawDn& image) {
 }  // namespace
 
 Result<void> check_drizzle_memory(int width, int height, const merge::DrizzleOptions& options, double limit_bytes) {
-  constexpr double sum_bytes = 36, encoding_bytes = 16;  // of an output pixel
+  constexpr double sum_bytes = 36, encoding_bytes = 16;  // bytes of an output pixel
   const auto sums = static_cast<double>(merge::Drizzle::memory_bytes(width, height, options));
   const double needed = sums * (sum_bytes + encoding_bytes) / sum_bytes;
   if (needed <= limit_bytes) return {};

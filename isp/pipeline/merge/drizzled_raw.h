@@ -19,7 +19,7 @@ Result<void> check_drizzle_memory(int width, int height, const merge::DrizzleOpt
 ///
 /// The NoiseProfile is that of larger areas: that of single pixels, times the square of noise_correlation_ratio.
 /// @param image       emptied
-/// @param prediction  of the reference [e-]
+/// @param prediction  prediction of the reference [e-]
 /// @param reference   the noise and levels of the reference
 /// @param frame       the reference as it was read; colour and corrections are moved out of it
 /// @param out         alignment and use of each frame are read; frame and mean_count are set

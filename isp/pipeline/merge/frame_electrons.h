@@ -22,12 +22,12 @@ struct FrameElectrons {
   BayerPhase phase = BayerPhase::rggb;
   PerSite<double> variance_e2{};              // without light: read noise, dark charge, quantisation
   PerSite<double> dark_charge_e{};            // mean that was subtracted; 0 if unknown
-  bool dark_is_estimated = false;             // that mean was estimated from the frame itself
-  PerSite<double> common_variance_e2{};       // of the subtracted dark frame, which frames of one exposure share
+  bool dark_is_estimated = false;             // dark_mean_e was estimated from the frame itself
+  PerSite<double> common_variance_e2{};       // variance of the subtracted dark frame, common to frames of one exposure
   std::array<double, 3> saturation_e{};       // signal from which on a site of R, G, B is saturated
   std::optional<SaturationLevel> saturation;  // set where the sensor saturates below white
   PerSite<double> light_at_white_e{};
-  Plane<float> gain;  // that corrects the shading of the lens at each pixel; empty: none is stated, or not wanted
+  Plane<float> gain;  // gain that corrects the shading of the lens at each pixel; empty: not stated, or not requested
   std::vector<std::string> warnings;
 };
 

@@ -74,7 +74,7 @@ class FrameLoader {
   Executor& executor_;
   StageClock& clock_;
   FrameToMerge reference_;
-  FrameInfo last_;  // of the frame that was read last
+  FrameInfo last_;  // information of the frame that was read last
   std::string last_name_;
   bool exposures_differ_ = false;
   bool with_gain_ = true;

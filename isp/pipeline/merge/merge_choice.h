@@ -15,7 +15,7 @@ namespace lowlux::isp {
 struct MergeChoice {
   MergeMethod method;
   bool bracket = false;                  // the exposures of frames that were read differ
-  std::map<int, merge::Motion> motions;  // of frames of equal exposure that were measured for the choice
+  std::map<int, merge::Motion> motions;  // motions that were measured for the choice, of frames of equal exposure
   std::optional<MergePlan> plan;         // set where there is a budget
   std::string warning;                   // empty: none
 };

@@ -140,7 +140,7 @@ void mark_saturated(Plane<float>& mean, const Plane<float>& weight, PlaneView<co
 }
 
 /// Returns how the variance differs from what the NoiseProfile states, by blocks; null where it hardly does.
-/// @param stated_variance  of a site (x, y), in the unit of 1 / weight
+/// @param stated_variance  stated variance of a site (x, y), in the unit of 1 / weight
 template <class Found, class Stated>
 std::shared_ptr<const NoiseRatio> noise_ratio(const Plane<float>& weight, const Found& found_variance,
                                               const Stated& stated_variance, Executor& executor) {

@@ -21,7 +21,7 @@ SampleLevels fine_levels(const SampleLevels& codes, const FrameElectrons& refere
 /// Smooths gains that were measured for each pixel (flat frames): after displaced frames were averaged, the pixels of
 /// the reference have no response of their own, and what the lens takes away is left. Each gain becomes the mean of
 /// those within 16 sites of its own parity.
-/// @param height_px  of the frame; coarser maps stay
+/// @param height_px  height of the frame; coarser maps stay
 void smooth_gain_maps(RawCorrections& corrections, int height_px, Executor& executor);
 
 /// Encodes the mean of a merge as a raw frame, with its noise. The variance of a site is 1 / MosaicMean::weight, times

@@ -19,7 +19,7 @@ namespace lowlux::isp {
 enum class MergeAlignment : std::uint8_t {
   none,      // the camera did not move
   cells,     // by tiles, in whole CFA cells; detail is blurred by up to a pixel
-  subpixel,  // as `cells`, and the rest by differences predicted from the developed reference
+  subpixel,  // like `cells`, and fractions of a cell by predicted differences of the developed reference
   stars,     // by the stars, at any distance, to a fraction of a pixel
 };
 
@@ -33,7 +33,7 @@ struct MergeOptions {
   bool keep_foreground = false;  // with stars: what stands still on the ground is averaged in its place
   std::optional<merge::DrizzleOptions> drizzle;  // makes a LinearRaw image; frames move, and their exposure is one
   bool developed_after = false;                  // a budget is for developing the merged frame too
-  std::optional<double> memory_limit_bytes;      // of a drizzled image, which is larger than its frames
+  std::optional<double> memory_limit_bytes;      // memory limit of a drizzled image, which is larger than its frames
 };
 
 /// Describes the work that a merge does on each frame.
@@ -56,7 +56,7 @@ struct MergePlan {
 
 /// States how much of a frame was used, and why not more.
 struct FrameUse {
-  double used_fraction = 1;    // of the sites that could be compared
+  double used_fraction = 1;    // fraction of the comparable sites that were used
   std::int64_t outliers = 0;   // single sites left out: cosmic rays, satellites
   double mean_chi_square = 1;  // squared difference to the reference over its variance; 1 for a static scene
   double largest_shift_px = 0;
@@ -82,8 +82,8 @@ struct MergedRaw {
   /// Variance over larger areas over that of a mean of so many frames, of R, G and B; brackets do not use it.
   std::array<double, 3> drop_noise{1, 1, 1};
   int stars = 0;                           // found in the reference, if frames were aligned by stars
-  double still_fraction = 0;               // of the blocks, that stand still while the stars move
-  std::array<double, 3> empty_fraction{};  // of the pixels of a drizzled image, without data of R, G, B
+  double still_fraction = 0;               // fraction of the blocks that do not move while the stars move
+  std::array<double, 3> empty_fraction{};  // fractions of the pixels of a drizzled image without data of R, G, B
   std::vector<std::string> warnings;
   std::vector<StageTime> times;
 };
@@ -94,7 +94,7 @@ struct MergedRaw {
 struct FrameToMerge {
   RawFrame frame;
   DevelopOptions options;
-  std::string name;  // of the frame in errors
+  std::string name;  // name of the frame in error messages
 };
 
 /// Returns the frame of an index, for the reference or as another one. It may be called more than once for each, always

@@ -257,7 +257,7 @@ Result<void> MovedMerge::add(FrameElectrons& frame, int index) {
   if (changes_shading()) change_shading(frame, *motion, std::as_const(gain_).view(), executor);
   frame.gain = {};
   Plane<float> site_weight;
-  bool is_least = false;  // of the frames of a bracket so far
+  bool is_least = false;  // the frame has the least light of the bracket so far
   if (bracket_) {
     use.light = bracket_->measured_light(view_of(work_.reference), frame, *motion, *stated);
     is_least = bracket_->add(frame, use.light, saturated, *motion);

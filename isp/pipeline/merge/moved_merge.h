@@ -78,17 +78,17 @@ class MovedMerge {
   std::optional<BracketFrames> bracket_;
   std::optional<merge::AlignReference> tiles_;  // how frames are aligned
   std::optional<StarAlignment> stars_;
-  Plane<float> gain_;                      // of the result; empty: it has no shading
-  CameraRgb prediction_;                   // of the reference, without noise
+  Plane<float> gain_;                      // gain of the result; empty: it has no shading
+  CameraRgb prediction_;                   // prediction of the reference, without noise
   Plane<std::uint8_t> still_;              // blocks of the foreground: 1; empty: none
   std::optional<merge::MosaicMean> mean_;  // the sum is one of these
   std::optional<merge::Drizzle> drizzle_;
   std::optional<merge::ColourMean> colours_;  // from which the reference is predicted again
   int colour_frames_ = 0;
   PerSite<double> level_e_{};             // mean signal, for the weights of drizzling and the size of drops
-  double frames_used_ = 0;                // as drops, by the share of their blocks that count
+  double frames_used_ = 0;                // number of frames, as drops, by the fraction of their blocks that match
   std::array<double, 3> excess_noise_{};  // sum of what their drops add to the variance, over that of a frame
-  double drop_radius_px_ = 1;             // of stars, which have no prediction; a drop holds a sample of each colour
+  double drop_radius_px_ = 1;  // radius with stars, which have no prediction; a drop contains a sample of each colour
 };
 
 }  // namespace lowlux::isp

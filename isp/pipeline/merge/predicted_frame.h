@@ -20,7 +20,7 @@ Result<CameraRgb> predicted_electrons(RawFrame& frame, const DevelopOptions& opt
 /// @param mean       in electrons of the reference
 /// @param reference  the noise and levels of the reference
 /// @param frame      the reference as it was read, for its colour and noise
-/// @param options    of the reference
+/// @param options    options of the reference
 /// Errors: those of develop.
 Result<CameraRgb> predicted_electrons(merge::MosaicMean mean, const FrameElectrons& reference, const RawFrame& frame,
                                       const DevelopOptions& options, Executor& executor);

@@ -213,7 +213,7 @@ Thumbnail light_of(const Thumbnail& thumbnail, const RawFrame& frame, const RawL
     electrons = electrons_by_colour(raw, levels);
     light_e = light_at_white_by_colour(raw, levels);
   }
-  double gain = 0;  // of the noise, as the mean over pixels
+  double gain = 0;  // gain of the noise, as the mean over pixels
   for (std::size_t c = 0; c < 3; ++c) {
     const auto per_light = static_cast<float>(electrons[c] / light_e[c]);
     const auto dark = static_cast<float>(1 - light_e[c] / electrons[c]);

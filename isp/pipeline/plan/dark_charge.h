@@ -23,7 +23,7 @@ struct DarkCharge {
   } state = State::not_examined;
   std::optional<double> mean_e;            // mean over pixels, where it is known or estimated
   PerSite<double> charge_e{};              // charge of each site, where mean_e is set
-  std::optional<double> standard_error_e;  // of mean_e, without that of the gain; absent for quoted figures
+  std::optional<double> standard_error_e;  // error of mean_e, without that of the gain; absent for published figures
   PerSite<double> estimated_e{};           // State::estimated: charge of each site
   std::optional<double> alpha;             // result of signal_fraction_at_median
   /// State::unknown: the largest fraction of the charge of the median block that may be dark charge, that of the

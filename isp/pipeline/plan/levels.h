@@ -35,7 +35,7 @@ std::array<double, 3> saturated_from(const RawDn& raw, const RawLevels& levels);
 /// measured on the image itself contains that charge and is not raised to masked pixels, which on some cameras have
 /// twice the variance. At least that of rounding, which floating-point samples do not have; what subtracting a dark
 /// frame adds is in. Precondition: frame.noise.
-/// @param site        of the black point: of a mosaic's cell, or a plane of other frames
+/// @param site        site of the black point: of a mosaic's cell, or a plane of other frames
 /// @param colour      of the noise model
 /// @param electrons   at white
 /// @param e_per_dn    electrons of a code

@@ -27,7 +27,7 @@ struct NoiseRequest {
 };
 
 /// Returns the median over all blocks of the signal-to-noise ratio of a mean pixel, with the noise of each block.
-/// @param electrons  of R, G, B at white
+/// @param electrons  electrons of R, G, B at white
 /// @param snr        memory; grows to one value for each block
 double middle_snr(const RawFrame& frame, const Thumbnail& thumbnail, const std::array<double, 3>& electrons,
                   const denoise::RawNoise& noise, std::vector<double>& snr);

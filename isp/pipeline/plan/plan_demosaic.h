@@ -22,7 +22,7 @@ struct DemosaicPlan {
 /// Holds what the interpolation is decided by.
 struct DemosaicRequest {
   std::optional<DemosaicMethod> method;                         // given; absent: chosen
-  DemosaicMethod max_method = DemosaicMethod::residual_median;  // that there is time for
+  DemosaicMethod max_method = DemosaicMethod::residual_median;  // most expensive method that fits into the time
   std::optional<double> signal_e;  // signal of a green pixel in the median block; absent: not known
 };
 

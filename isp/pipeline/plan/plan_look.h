@@ -18,7 +18,7 @@ namespace lowlux::isp {
 /// Holds what a look is decided by: the light of a frame, and how it would be rendered without the look.
 struct FrameLight {
   std::span<const float> block_luminance;  // white balanced, 1 at the white level, signed
-  double black_noise_std = 0;              // of one pixel, same unit
+  double black_noise_std = 0;              // standard deviation of the noise of one black pixel, in the same unit
   std::optional<WhitePoint> white;         // absent without a colour calibration
   double exposure_ev = 0;
   Matrix3 balanced = identity3();  // result of balanced_to_output()

@@ -191,7 +191,7 @@ Result<Matrix3> balanced_to_output(const RawFrame& frame, const DevelopOptions& 
 void rendered_luminance(const CameraRgb& blocks, OutputSpace space, const std::array<float, 3>& white_gain,
                         const Matrix3& balanced, std::span<float> out) {
   const Vector3 luminance = luminance_of(space);
-  Vector3 weights{};  // of white-balanced camera RGB
+  Vector3 weights{};  // weights of white-balanced camera RGB
   for (int c = 0; c < 3; ++c) {
     for (int i = 0; i < 3; ++i) weights[c] += luminance[i] * balanced[i][c];
   }

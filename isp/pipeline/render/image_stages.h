@@ -47,7 +47,7 @@ class ImageStages {
   CameraPlanes finish(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan, const NoiseMaps& maps);
 
   /// Changes the light as the plan's look or profile requests, and returns what remains to be done.
-  /// @param maps  of the active area, read where noise was reduced and the look needs it
+  /// @param maps  maps of the active area, read where noise was reduced and the look needs it
   Light look(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan, const NoiseMaps& maps);
 
   /// Returns the map of seeing of the frame rendered last; absent unless the plan requested it.

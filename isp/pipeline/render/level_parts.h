@@ -31,7 +31,7 @@ void take_dark_off(PlaneView<const float> raw_e, const denoise::RawNoise& noise,
 
 /// Sets the maps of a tile that keeps its noise: see NoiseMaps.
 /// @param raw_e  its corner at an even column and row of the active area
-/// @param maps   of the tile's cells; none may be absent
+/// @param maps   maps of the tile's cells; none may be absent
 void set_own_noise(const denoise::RawElectronsView& raw_e, const NoiseReduction& how, const denoise::DenoiseMaps& maps);
 
 }  // namespace lowlux::isp

@@ -28,7 +28,7 @@ void of_maps(const DevelopPlan& plan, const RawDn& raw, const PlaneView<const fl
   const Rect& crop = raw.default_crop;
   const std::array<float, 3> weights = luminance_of_camera(plan);
   const float unit = (weights[0] + weights[1] + weights[2]) / static_cast<float>(luma_at_white(plan, raw));
-  const int side = plan.noise_reduction.cell_e ? 1 : 2;  // of a cell of the denoiser [px]
+  const int side = plan.noise_reduction.cell_e ? 1 : 2;  // side of a cell of the denoiser [px]
   const int cells = (plan.options.half ? 8 : 4) / side;  // along a side of the grid's
   for_each_band(executor, out.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
@@ -64,7 +64,7 @@ NoiseProfile profile_of_light(const DevelopPlan& plan, const NoiseProfile& raw, 
 void of_model(const DevelopPlan& plan, const Rect& crop, const NoiseProfile& noise, const RgbView<const float>& quarter,
               PlaneView<float> out, Executor& executor) {
   const NoiseRatioView ratio = view_of(plan.noise_reduction.noise_ratio.get()).from(crop.x, crop.y);
-  const int side = plan.options.half ? 8 : 4;  // of a cell of the grid, in pixels of the mosaic
+  const int side = plan.options.half ? 8 : 4;  // side of a cell of the grid, in pixels of the mosaic
   const std::array<float, 3> weights = luminance_of_camera(plan);
   const bool monochrome = !plan.rendering.white;  // one plane serves for all three
   for_each_band(executor, out.height, [&](RowBand band, int) {

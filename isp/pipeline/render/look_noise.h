@@ -11,7 +11,7 @@ namespace lowlux::isp {
 /// Computes the variance of the noise in the luminance of the image's pixels, in their unit (that of
 /// plan.rendering.transform), one value for each cell of 4 x 4: the residual noise that the denoiser predicts, or the
 /// input noise that the noise model predicts. Needs noise that was reduced, or a frame with a noise profile.
-/// @param maps  of the active area; read where noise was reduced
+/// @param maps  maps of the active area; read where noise was reduced
 /// @param quarter  means of camera RGB (RawToRgb::quarter), read where noise was not reduced
 /// @param out  ceil(plan.height / 4) x ceil(plan.width / 4)
 void noise_of_luminance(const DevelopPlan& plan, const RawFrame& frame, const NoiseMaps& maps,

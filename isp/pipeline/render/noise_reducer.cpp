@@ -81,7 +81,7 @@ struct BlendSites {
 
 /// Sums over the sites of cells.
 struct CellSums {
-  std::array<float, strip_cells> squares{};                     // of differences, less their expectation
+  std::array<float, strip_cells> squares{};                     // squares of differences, less their expectation
   std::array<std::array<float, strip_cells>, 3> differences{};  // of R, G, B
   std::array<std::array<float, strip_cells>, 3> sites{};        // their number
 };
@@ -108,7 +108,7 @@ void blend_sites(const BlendSites& in, const float* detail_e2) {
 
 /// Replaces the sums of squares by the mean over the sites of their block without those of the mean differences of
 /// colours, at least 0: a level keeps the means of blocks, so that what differs there has moved.
-/// @param columns  of sites
+/// @param columns  number of columns of sites
 void average_blocks(CellSums& sums, int columns, int rows) {
   constexpr int block = 2 * block_cells;
   for (int x = 0; x < columns; x += block) {

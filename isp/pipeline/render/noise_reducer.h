@@ -37,7 +37,7 @@ class NoiseReducer {
   /// reduced with a margin of its own, and the others keep their noise.
   /// @param raw_e     the padded tile, without the lines of `how`
   /// @param signal_e  as large; the core is set; may be result_memory()
-  /// @param maps      of the cells of the padded tile, those of the core are set; none if they are not wanted
+  /// @param maps      maps of the cells of the padded tile, those of the core are set; none if they are not wanted
   /// Precondition: how.reduces(); with previous frames, the piece is the whole frame.
   void run(const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e, PlaneView<float> signal_e,
            const denoise::DenoiseMaps& maps = {});

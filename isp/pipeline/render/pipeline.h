@@ -26,7 +26,7 @@ class Pipeline {
 
   /// Renders a frame to `out`, an image of the planned size and sample type: see make_picture(). Images that are
   /// cropped or shrunk allocate memory for the image before that.
-  /// @param charge  of the frame, as plan_develop returns it, so that it is not computed again; may be empty
+  /// @param charge  charge of the frame, as plan_develop returns it, so that it is not computed again; may be empty
   void render(const RawFrame& frame, const DevelopPlan& plan, Picture& out, RawElectrons charge = {});
   /// Renders a frame to 8-bit codes, row by row; plan.display and plan.framing are ignored. This function and those
   /// that follow process frames of any size as a whole.

@@ -37,9 +37,9 @@ void read_pixels(const RawFrame& frame, const RawLevels& levels, const Rect& par
 
 /// States the charge of cells.
 struct CellCharge {
-  std::array<double, 3> cell_e{};          // of the sites of R, G, B at white [e-]
+  std::array<double, 3> cell_e{};          // charge of the sites of R, G, B at white [e-]
   std::optional<double> half_variance_e2;  // set for parts_of_colours: of a half of green without light
-  NoiseRatioView noise_ratio{};            // of the pixels
+  NoiseRatioView noise_ratio{};            // noise ratio of the pixels
   int x = 0, y = 0;                        // corner of the pixels in their frame, by which signs of deviations differ
 };
 

@@ -30,7 +30,7 @@ class SignalStages {
   void set_charge(Plane<float> charge_e);
 
   /// Returns the mosaic of a region of a Bayer frame, in which the sites of Region::signal are set.
-  /// @param maps  of the active area, filled where not null
+  /// @param maps  maps of the active area, filled where not null
   /// Precondition: plan.levels.electrons_at_white; maps are null, or the region is the whole frame.
   SignalElectronsView electrons(const RawFrame& frame, const DevelopPlan& plan, const Region& region, NoiseMaps* maps);
 

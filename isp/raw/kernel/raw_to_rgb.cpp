@@ -227,7 +227,7 @@ struct ThreadBytes {
   std::size_t ring;
   std::size_t look;
   std::size_t codes;     // a row of codes for a CodeChange or a RowSink
-  std::size_t demosaic;  // of a ResidualBand, or a second ring
+  std::size_t demosaic;  // scratch memory of a ResidualBand, or of a second ring
 
   explicit ThreadBytes(int width)
       : ring(run_stride_of(width) * runs_per_thread * sizeof(float)),

@@ -113,7 +113,7 @@ struct BandScratch {
   Ring ring;
   float* look;
   std::uint16_t* codes;  // 3 for each pixel of a row
-  Scratch demosaic;      // of a ResidualBand, or a second ring; closed
+  Scratch demosaic;      // scratch memory of a ResidualBand, or of a second ring; closed
   std::array<ScratchUse, 3> use;
 };
 

@@ -46,8 +46,8 @@ class ResidualBand {
   RowBand band_;
   rows::Encoding encoding_;
   float ridge_;
-  float floor_;         // of gradients
-  float detail_floor_;  // of shared detail
+  float floor_;         // smallest sum of gradients
+  float detail_floor_;  // smallest squared detail
   bool median_;
   float* blocks_;
   float* made_;

@@ -100,7 +100,7 @@ void shared_detail_row(const SharedDetailRows& in, int pairs);
 struct GreenRows {
   ConstSiteRow u[3];         // rows y - 1 to y + 1
   ConstSiteRow horizontal;   // differences of the row
-  ConstSiteRow vertical[9];  // of rows y - 4 to y + 4; own in every other one, green in those between
+  ConstSiteRow vertical[9];  // rows y - 4 to y + 4, alternately of the own colour and of green
   const float* sum_h;
   const float* sum_above;  // vertical sums of rows y - 2 and y + 2
   const float* sum_below;
@@ -136,7 +136,7 @@ void rest_row(const RestRows& in, int pairs);
 /// Interpolates the differences to green of both colours at all sites but the measured ones: with slope and rest
 /// bilinear between the samples of a colour, difference = slope * green + rest.
 struct ColourDifferenceRows {
-  const float* slope[3];  // of rows y - 1 to y + 1: the own colour in the middle one, the other in the rest
+  const float* slope[3];  // rows y - 1 to y + 1: the own colour in the middle, the other colour above and below
   const float* rest[3];
   const float* green_at_own;
   const float* green;

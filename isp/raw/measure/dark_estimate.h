@@ -10,9 +10,9 @@ namespace lowlux::isp {
 
 /// Holds what estimate_dark_charge needs of a frame: means over blocks, dark charge included, and their noise.
 struct DarkEvidence {
-  const CameraRgb& mean;                       // of blocks, fraction of white, signed, not white balanced
-  std::array<double, 3> electrons_at_white{};  // of R, G, B
-  std::array<double, 3> variance_e2{};         // of one pixel without charge
+  const CameraRgb& mean;                       // means of blocks, in fractions of white, signed, not white balanced
+  std::array<double, 3> electrons_at_white{};  // electrons of R, G, B at white
+  std::array<double, 3> variance_e2{};         // variance of one pixel without charge
   double pixels = 1;                           // in a block
   std::optional<Vector3> neutral;              // camera RGB of a neutral, if the source states it
   const Plane<float>* clipped = nullptr;       // fraction of each block's samples at white; null: not known
@@ -20,9 +20,9 @@ struct DarkEvidence {
 
 /// States the dark charge that the darkest blocks of a frame show.
 struct DarkEstimate {
-  std::array<double, 3> charge_e{};  // of R, G, B; their mean over pixels is `mean_e`
+  std::array<double, 3> charge_e{};  // charges of R, G, B; their mean over pixels is `mean_e`
   double mean_e = 0;
-  double standard_error_e = 0;  // of mean_e, the spread of colours of dark surfaces included
+  double standard_error_e = 0;  // standard error of mean_e, the spread of colours of dark surfaces included
   double light_e = 0;           // charge that light made in the green pixels of the darkest blocks
   double misfit = 0;            // square of the deviation that no dark charge explains, in standard deviations
 

@@ -40,7 +40,7 @@ class ExposureMeter {
   /// lies in the upper half of the range, it counts as white for this frame and those after it.
   /// @param black  where it is a bound, highlight and range count from code 0: codes are then never predicted too low
   /// for more light, and exposures that approach white do so from below
-  /// @param fraction  of the pixels, which exceed the highlight
+  /// @param fraction  fraction of the pixels, which exceed the highlight
   MeteredCodes codes(const MeteredBlack& black, double white_dn, double fraction);
 
  private:

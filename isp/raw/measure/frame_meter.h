@@ -61,7 +61,7 @@ class FrameMeter {
   struct Tally {
     PerSite<std::uint64_t> masked_sum{};
     PerSite<std::uint64_t> masked_count{};
-    PerSite<std::uint64_t> sum{};  // of the codes
+    PerSite<std::uint64_t> sum{};  // sum of the codes
     std::uint64_t clipped = 0;
     std::uint64_t zero = 0;
     std::array<std::array<std::uint32_t, FrameStatistics::bins>, 2> luma{};  // histograms of even and of odd cells

@@ -21,6 +21,7 @@ void sum_columns(const CodeRows& in, std::uint32_t* column);
 /// Computes the same, and square[x] = sum of min(|dn[x] - dn[x + 2]|, 5792)^2 for x < width - 2.
 void sum_columns(const CodeRows& in, std::uint32_t* column, std::uint32_t* square);
 
+/// Counts codes at the ends of the range.
 struct Extremes {
   std::uint32_t clipped = 0;  // number of codes of white or more
   std::uint32_t zero = 0;

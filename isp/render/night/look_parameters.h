@@ -25,7 +25,7 @@ struct NightLook {
   std::array<float, 3> luminance{};       // weights in the pixels' primaries, as in LookGrid
   std::array<float, 3> rods{};
   std::array<float, 3> tint{};
-  float dark = 1e-6f;      // as in LookGrid: about the noise of a pixel
+  float dark = 1e-6f;      // as in LookGrid: approximately the noise of a pixel
   std::uint64_t seed = 1;  // seed of visual_noise
 };
 

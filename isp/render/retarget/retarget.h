@@ -19,13 +19,14 @@ enum class RetargetMethod : std::uint8_t {
   constrained,  // this project's method: the displayable colour with the closest appearance by Shin's model
                 // (closest_displayable)
   shin,         // Shin's model inverted as published, Y' that of the source, then moved towards neutral (thesis 5.3)
-  shin_consistent,  // as `shin`, with Y' of the result itself
+  shin_consistent,  // like `shin`, with Y' of the result itself
   wanat,            // saturation and luminance curve of Wanat & Mantiuk 2014
   cao,              // the two-term model of Cao et al. 2008, which the thesis calls Wanat & Mantiuk's
   icam06,           // the displayable colour with the closest appearance by iCAM06
   none,             // the image unchanged
 };
 
+/// Holds a method and its name.
 struct NamedRetargetMethod {
   RetargetMethod method;
   std::string_view name;
@@ -44,6 +45,7 @@ std::string_view name_of(RetargetMethod method);
 /// Returns the method of that name. Error: invalid_argument; the message lists the valid names.
 Result<RetargetMethod> retarget_method_named(std::string_view name);
 
+/// Holds the request for another display.
 struct RetargetOptions {
   RetargetMethod method = RetargetMethod::constrained;
   double source_cd_m2 = 250;         // white of the display or scene for which the image is correct
@@ -57,6 +59,7 @@ struct RetargetOptions {
 /// Returns the origin of the coefficients, for reports; empty for methods without Shin's model.
 std::string coefficients_name(const RetargetOptions& options);
 
+/// Holds a colour for another display.
 struct RetargetedColour {
   Vector3 code{};
   bool held = false;  // whether the colour of equal appearance is outside the display's gamut

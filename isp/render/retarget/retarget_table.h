@@ -32,7 +32,7 @@ Vector3 looked_up(const RetargetTable& table, const Vector3& code);
 struct TableError {
   double mean_ciede2000 = 0;  // error of sRGB under D65
   double max_ciede2000 = 0;
-  double mean_steps = 0;  // of 255, mean of the largest of the three components
+  double mean_steps = 0;  // mean of the largest error of the three components, in steps of 255
   double max_steps = 0;
 };
 

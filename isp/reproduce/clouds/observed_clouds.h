@@ -43,6 +43,7 @@ struct Cloud {
   ChromaticityCloud predicted;  // to first order
 };
 
+/// Holds a colour and its light.
 struct Colour {
   std::string name;
   Spectrum light;

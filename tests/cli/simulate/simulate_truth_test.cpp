@@ -159,7 +159,8 @@ TEST_F(SimulateTruth, ElectronsAreThoseOfTheRawFile) {
 }
 
 // What is left is the camera's colour error: a matrix cannot turn its sensitivities into the observer's. By how much,
-// only the sensitivities tell: 1.50, 1.50 and 1.00 were measured, and a tenth more than the largest is the limit.
+// only the sensitivities tell: 1.50, 1.50 and 1.00 were measured, and a tenth more than the largest is the
+// limit.
 TEST_F(SimulateTruth, ANoiseFreeChartIsDevelopedToItsColours) {
   for (const char* camera : {"Nikon_D850", "Nikon_D5100", "Canon_EOS_600D"}) {
     const std::string name = camera;

@@ -54,8 +54,8 @@ TEST(EntropyMap, IsNearlyTheIdentityInDaylight) {
     most_old = std::fmax(most_old, ciede2000(lab_of(day_old(c), white), lab_of(c, white)));
   }
   // Neither cones are sums of the CIE 1931 functions: what is found is a metamer to them, and another colour to the
-  // observer of 1931. By how much, only the functions tell: 1.16 and 1.91 were measured, and a tenth more is the limit.
-  // Stockman's and Sharpe's are the nearer ones.
+  // observer of 1931. By how much, only the functions tell: 1.16 and 1.91 were measured, and a tenth more is
+  // the limit. Stockman's and Sharpe's are the nearer ones.
   EXPECT_LT(most, 1.1 * 1.16);
   EXPECT_LT(most_old, 1.1 * 1.91);
   EXPECT_LT(most, most_old);

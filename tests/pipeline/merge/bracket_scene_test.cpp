@@ -25,7 +25,7 @@ constexpr double saturated_from = 0.99;  // of white: plan_noise.cpp
 double limit_e() { return merge::full_weight_fraction * saturated_from * test::night_full_e(); }
 
 /// Blocks of 16 x 16 pixels in random order whose light follows a power law: a fraction u of them is brighter than
-/// least_e u^(-1 / exponent).
+/// min_e u^(-1 / exponent).
 struct PowerLaw {
   double least_e = 0;
   double exponent = 1;
