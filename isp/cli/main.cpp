@@ -38,20 +38,20 @@ constexpr std::array verbs{
     Verb{"develop", "develop raw files to images", run_develop},
     Verb{"denoise", "denoise raw files and write DNG for other raw developers", run_denoise},
 #ifndef LOWLUX_DEVELOP_ONLY
-    Verb{"merge", "merge several raw files of one scene to one with less noise", run_merge},
-    Verb{"info", "print what a raw file states and what was measured on it; exposure advice", run_info},
+    Verb{"merge", "merge raw files of one scene to one raw file with less noise", run_merge},
+    Verb{"info", "print metadata and measurements of raw files, and exposure advice", run_info},
     Verb{"capture", "take images, raw files or video from a camera", run_capture},
     Verb{"calibrate", "measure black level, noise and colour of a camera", run_calibrate},
     Verb{"retarget", "compensate images for dim displays", run_retarget},
     Verb{"resaturate", "restore colour lost to dark current in finished images", run_resaturate},
-    Verb{"doctor", "state what is installed, what is missing, and what would help", run_doctor},
+    Verb{"doctor", "test the installation and list missing components", run_doctor},
     Verb{"simulate", "simulate raw files with a known noise-free reference", run_simulate},
-    Verb{"dataset", "simulate data sets: scenes, sensors and settings from distributions", run_dataset},
+    Verb{"dataset", "simulate data sets for training, with settings drawn from distributions", run_dataset},
     Verb{"compare", "compare two images: CIEDE2000, gamut, PSNR, SSIM", run_compare},
 #endif
 #ifdef LOWLUX_WITH_MEASUREMENT
     Verb{"bench", "measure accuracy against time, compared with other methods", run_bench},
-    Verb{"reproduce", "run the published experiments and compare the findings", run_reproduce},
+    Verb{"reproduce", "repeat published experiments and compare the findings", run_reproduce},
 #endif
 };
 constexpr std::size_t photographers_verbs = 9;  // the first ones; the others are for measurement
@@ -142,7 +142,8 @@ int run(std::vector<std::string> args) {
     return exit_done;
   }
   if (!isp::cpu_runs_raw_to_rgb()) {
-    return print_breakdown({ErrorCode::unsupported, "this processor lacks SSSE3, which the kernels need", {}}, args);
+    return print_breakdown(
+        {ErrorCode::unsupported, "this processor does not support SSSE3, which the kernels require", {}}, args);
   }
   return run_verb(args);
 }

@@ -52,7 +52,7 @@ constexpr std::array<Number, 14> numbers{{
      &Properties::lux},
     {"f-number", "F-number", "F-number of the lens, for the look of the eye; below 0.1: not known", 0, 100,
      &Properties::f_number},
-    {"budget-ms", "Time for a frame",
+    {"budget-ms", "Time limit of a frame",
      "Time limit for a frame [ms], to which noise reduction is reduced in steps; below 0.01: no limit", 0, 1e6,
      &Properties::budget_ms},
 }};

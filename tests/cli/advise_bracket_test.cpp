@@ -84,16 +84,17 @@ TEST_F(AdviseBracket, RefusesWhatIsForASensorAndWhatCannotBe) {
     int exit_code;
     const char* says;
   };
-  for (const Case& c : std::vector<Case>{
-           {{raw, "--luminance", "1"}, 2, "--luminance needs --sensor"},
-           {{raw, "--report", "x.html"}, 2, "--report needs --sensor"},
-           {{}, 2, "needs --sensor"},
-           {{raw, "--snr", "90"}, 2, "--snr is not within"},
-           {{raw, "--clip", "0"}, 2, "--clip is not within"},
-           {{raw, "--max-exposure", "0"}, 2, "--max-exposure is not above 0"},
-           {{raw, "--motion", "3"}, 2, "must be given together"},
-           {{raw, "--max-exposure", "1e-5", "--snr", "60"}, 1, "more than 9999 frames"},
-           {{raw, "--snr", "10", "--sensor", "thesis", "--max-exposure", "1"}, 2, "leave --sensor out"}}) {
+  for (const Case& c : std::vector<Case>{{{raw, "--luminance", "1"}, 2, "--luminance needs --sensor"},
+                                         {{raw, "--report", "x.html"}, 2, "--report needs --sensor"},
+                                         {{}, 2, "needs --sensor"},
+                                         {{raw, "--snr", "90"}, 2, "--snr is not within"},
+                                         {{raw, "--clip", "0"}, 2, "--clip is not within"},
+                                         {{raw, "--max-exposure", "0"}, 2, "--max-exposure is not above 0"},
+                                         {{raw, "--motion", "3"}, 2, "must be given together"},
+                                         {{raw, "--max-exposure", "1e-5", "--snr", "60"}, 1, "more than 9999 frames"},
+                                         {{raw, "--snr", "10", "--sensor", "thesis", "--max-exposure", "1"},
+                                          2,
+                                          "--snr and --sensor are mutually exclusive"}}) {
     Words words{"info", "--advise"};
     words.insert(words.end(), c.words.begin(), c.words.end());
     const auto result = lowlux(words);

@@ -152,7 +152,7 @@ TEST_F(Advise, OfAProfileSaturatesAsItsIsoSpeedsSay) {
     const double iso = i == 0 ? 100 : 800;
     // L / L_saturation with L_saturation = 78 N^2 / (0.65 S t), and no dark current.
     const double share = 10 * 0.65 * iso * 0.01 / (78 * 2.8 * 2.8);
-    EXPECT_NEAR(json["gains"][i]["highlight_share_of_range"].get<double>() / share, 1, 1e-9);
+    EXPECT_NEAR(json["gains"][i]["highlight_fraction_of_range"].get<double>() / share, 1, 1e-9);
     const double green_e = 32000 * 100 / iso * share / 10;
     const double variance_e2 = green_e + std::pow(400 / iso, 2) + std::pow(200 / iso, 2) / 12;
     EXPECT_NEAR(json["gains"][i]["snr"].get<double>() / (green_e * green_e / variance_e2), 1, 1e-9);
@@ -216,7 +216,7 @@ TEST_F(Advise, RefusesWhatCannotBeInOneLine) {
            {{"--luminance", "1", "--highlight", "9x", "--max-exposure", "1"}, 2, "needs --sensor"},
            {{"--sensor", "thesis", "--highlight", "9x", "--max-exposure", "1"}, 2, "needs --luminance"},
            {{"--sensor", "thesis", "--luminance", "1", "--max-exposure", "1"}, 2, "needs --highlight"},
-           {night, 2, "needs a longest exposure"},
+           {night, 2, "needs a limit on the exposure time"},
            {with(good, {"--motion", "3"}), 2, "must be given together"},
            {with(good, {"--motion", "0", "--blur", "1"}), 2, "above 0"},
            {with(good, {some_file, some_file}), 2, "one raw file"},
@@ -225,7 +225,7 @@ TEST_F(Advise, RefusesWhatCannotBeInOneLine) {
            {with(good, {"--report", file("page.txt")}), 2, ".html"},
            {with(good, {"--clip", "0.7"}), 2, "allowed to clip"},
            {with(good, {"--clip", "many"}), 2, "finite number"},
-           {with(good, {"--patch", "0"}), 2, "a patch has"},
+           {with(good, {"--patch", "0"}), 2, "a patch must have"},
            {with(good, {"--frames", "0"}), 2, "--frames"},
            {with(good, {"--temperature", "900"}), 2, "temperature"},
            {with(good, {"--f-number", "0"}), 2, "f-number"},

@@ -172,7 +172,7 @@ TEST_F(Batch, RawFilesInSubFoldersAreReportedInOneLine) {
   EXPECT_EQ(names_in("out"), std::vector<std::string>{"a.png"});
   EXPECT_EQ(developed("raws", {"--quiet"}).err, "");
   EXPECT_EQ(developed("raws/first").err.find("sub-folder"), std::string::npos);
-  refused(developed("above"), "holds no raw files, its sub-folder " + file("above/second") + " does", 1);
+  refused(developed("above"), "contains no raw files, but its sub-folder " + file("above/second") + " does", 1);
 }
 
 TEST_F(Batch, InfoTakesFolders) {
@@ -207,7 +207,7 @@ TEST_F(Batch, ShardsMakeEachFileOnceAsOneRunDoes) {
       EXPECT_EQ(result.exit_code, 0) << result.err;
       const Json report = Json::parse(result.out);
       EXPECT_EQ(report.size(), i > files ? 0 : (files - i) / shards + 1) << i << "/" << shards << " of " << files;
-      EXPECT_EQ(result.err.find("no raw file falls to shard") != std::string::npos, report.empty()) << result.err;
+      EXPECT_EQ(result.err.find("contains no raw file") != std::string::npos, report.empty()) << result.err;
       made += report.size();
     }
     EXPECT_EQ(made, files);

@@ -104,7 +104,7 @@ TEST(BenchPage, LeavesOutWhatAStageDoesNotHave) {
   measured.outcome.plots.clear();
   measured.outcome.remarks.clear();
   const std::string page = page_of(list_of(std::move(measured)));
-  for (const char* part : {">Charts<", "Pictures", "What it must show", "How it was measured", "<canvas"}) {
+  for (const char* part : {">Charts<", "Pictures", "Expectations", "How it was measured", "<canvas"}) {
     EXPECT_FALSE(holds(page, part)) << part;
   }
   EXPECT_TRUE(holds(page, "none are stated"));

@@ -111,17 +111,18 @@ TEST_F(Config, DefaultsThatAValueOfTheArgumentsExcludesAreLeftOut) {
 }
 
 TEST_F(Config, ContradictionsNameTheLineOfADefaultOnlyWhereTheFileIsAtFault) {
-  refused("[develop]\nquality = 95\nspace = linear-srgb\nbrightness = 0.5\n", 4, "not with --tone none, linear spaces");
+  refused("[develop]\nquality = 95\nspace = linear-srgb\nbrightness = 0.5\n", 4,
+          "cannot be combined with --tone none, linear spaces");
   refused("[develop]\ntone = none\nlocal-tone = 0.5\n", 2, "--local-tone requires the standard tone curve");
   write("[develop]\ncontrast = 1.2\n");
   const auto result = develop({"--brightness", "0.5", "--tone", "none"});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_TRUE(result.err.starts_with("lowlux develop: --brightness and --contrast shape")) << result.err;
+  EXPECT_TRUE(result.err.starts_with("lowlux develop: --brightness and --contrast change")) << result.err;
 }
 
 TEST_F(Config, WrongLinesAreNamed) {
   refused("[develop]\nexposre = 1\n", 2, "develop has no option 'exposre' (did you mean exposure");
-  refused("[devlop]\n", 1, "there is no verb 'devlop'");
+  refused("[devlop]\n", 1, "unknown verb 'devlop'");
   refused("\nexposure = 1\n", 2, "[develop]");
   refused("[develop]\nexposure\n", 2, "option = value");
   refused("[develop]\n= 1\n", 2, "option = value");
@@ -181,7 +182,7 @@ TEST_F(Config, ADepthThatAFormatDoesNotHoldNamesItsLine) {
     line += 2;
   }
   const auto space = run({"develop", dog, "-o", file("x.exr"), "--bits", "32", "--space", "srgb"});
-  EXPECT_TRUE(holds(space.err, "lowlux develop: --space: float pictures are scene-linear")) << space.err;
+  EXPECT_TRUE(holds(space.err, "lowlux develop: --space: float images are scene-linear")) << space.err;
 }
 
 TEST_F(Config, DoctorNamesUnknownOptionsOfEveryVerb) {
@@ -223,7 +224,7 @@ TEST_F(Config, ALinkToItselfIsNoAbsentFile) {
 TEST_F(Config, HelpAndDoctorWorkWithABrokenFile) {
   write("[develop]\nexposre = 1\n[fry]\n");
   const auto doctor = run({"doctor"});
-  EXPECT_TRUE(holds(doctor.out + doctor.err, "config:3: there is no verb 'fry'")) << doctor.out << doctor.err;
+  EXPECT_TRUE(holds(doctor.out + doctor.err, "config:3: unknown verb 'fry'")) << doctor.out << doctor.err;
   EXPECT_EQ(develop({"--no-config"}).exit_code, 0);
   EXPECT_EQ(run({"develop", "--help"}).exit_code, 0);
 }

@@ -137,7 +137,7 @@ TEST_F(DarkFrameCommand, WhatCannotBeIsRefusedWithACure) {
   refused({"--dark-frame", file("empty")}, 1, "no raw files");
   refused({"--dark-frame", file("empty/*.dng")}, 1, "no file matches");
   refused({"--dark-frame", file("warm")}, 1, "--dark-doubling");
-  refused({"--dark-frame", file("brief")}, 1, "at most 4 times");
+  refused({"--dark-frame", file("brief")}, 1, "more than the limit of 4 times");
   refused({"--dark-frame", file("other")}, 1, "pixels");
 }
 

@@ -97,7 +97,7 @@ TEST_F(LookCommand, RefusesWhatDoesNotFit) {
   refused({"--look", "eye", "--effects", "purkinje,fog"}, "'fog'");
   refused({"--look", "eye", "--dimming", "2"}, "from 0 to 1");
   refused({"--noise-limit", "0"}, "neither off nor a lightness");
-  refused({"--display-luminance", "0"}, "luminance in cd/m2");
+  refused({"--display-luminance", "0"}, "is not a luminance from");
   refused({"--display-luminance", "2", "--space", "linear-srgb"}, "sRGB");
 }
 

@@ -62,7 +62,7 @@ TEST(Reproduce, JsonHasTheFindingsOfTheChosenExperimentsInTheirOrder) {
 TEST(Reproduce, CountsPublishedFindingsAndChecksApart) {
   const auto result = reproduce({"frequency-of-seeing", "--quick"});
   EXPECT_NE(result.out.find("\npublished findings: 1 agree, 0 have the same direction, 0 do not hold\n"
-                            "checks of our own: 1 agree, 0 have the same direction, 1 do not hold\n"),
+                            "additional checks: 1 agree, 0 have the same direction, 1 do not hold\n"),
             std::string::npos)
       << result.out;
   EXPECT_FALSE(result.out.ends_with("\n\n"));

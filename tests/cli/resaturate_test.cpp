@@ -85,7 +85,7 @@ TEST_F(ResaturateCommand, AnAreaOfThePictureTellsTheSameBlackPoint) {
 TEST_F(ResaturateCommand, ABlackPointThatIsTooBrightIsWarnedOf) {
   const auto result = run({"--black", "120,120,120"});
   EXPECT_EQ(result.exit_code, 0);
-  EXPECT_NE(result.err.find("no brighter than the black point"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("not brighter than the black point"), std::string::npos) << result.err;
 }
 
 TEST_F(ResaturateCommand, WritesEveryFormat) {
@@ -97,8 +97,8 @@ TEST_F(ResaturateCommand, WritesEveryFormat) {
 }
 
 TEST_F(ResaturateCommand, RefusesWhatCannotBe) {
-  refused({}, 2, "give the black point once");
-  refused({"--black", "1,2,3", "--black-area", "0,0,4,4"}, 2, "give the black point once");
+  refused({}, 2, "give either --black R,G,B or --black-area");
+  refused({"--black", "1,2,3", "--black-area", "0,0,4,4"}, 2, "give either --black R,G,B or --black-area");
   refused({"--black", "1,2"}, 2, "three codes");
   refused({"--black", "1,2,256"}, 2, "three codes");
   refused({"--black", "nan,2,3"}, 2, "three codes");

@@ -68,8 +68,8 @@ TEST_F(RetargetCommand, GivesAPictureColourForADimDisplayAndLeavesGreyGrey) {
   EXPECT_EQ(told["units"], "lux");
   EXPECT_EQ(told["display_cd_m2"], 2);
   EXPECT_LE(told["table_mean_ciede2000"].get<double>(), 0.5);
-  EXPECT_GE(told["share_beyond_gamut"].get<double>(), 0);
-  EXPECT_LT(told["share_beyond_gamut"].get<double>(), 1);
+  EXPECT_GE(told["fraction_beyond_gamut"].get<double>(), 0);
+  EXPECT_LT(told["fraction_beyond_gamut"].get<double>(), 1);
   const SceneLinear before = picture("in.png"), after = picture("out.png");
   EXPECT_GT(redness(after, 40, 12), 1.3 * redness(before, 40, 12));
   for (int x = 8; x < 64; ++x) EXPECT_LT(std::abs(redness(after, x, 4)), 1e-3) << x << ": equal codes";

@@ -74,12 +74,12 @@ TEST_F(StandardStreams, AReaderThatEndsGivesOneLine) {
 TEST_F(StandardStreams, RefuseWhatCannotBeInOneLine) {
   const std::string raw = "'" + dog + "'";
   for (const auto& [line, code, why] : {std::tuple{"develop - - -o " + quoted("out/"), 2, "given twice"},
-                                        {"develop " + raw + " -o - --json", 2, "standard output holds the file"},
+                                        {"develop " + raw + " -o - --json", 2, "standard output is the file"},
                                         {"develop " + raw + " -o - --json --nonsense", 2, "unknown option"},
                                         {"develop " + raw + " -o- --json --nonsense", 2, "unknown option"},
                                         {"develop " + raw + " --output=- --json --jobs 0", 2, "--jobs"},
-                                        {"develop " + raw + " -o - --explain", 2, "standard output holds the file"},
-                                        {"denoise " + raw + " -o - --timings", 2, "standard output holds the file"},
+                                        {"develop " + raw + " -o - --explain", 2, "standard output is the file"},
+                                        {"denoise " + raw + " -o - --timings", 2, "standard output is the file"},
                                         {"develop " + raw + " -o - --maps", 2, "maps need the name of a file"},
                                         {fmt::format("develop {} {} -o -", raw, raw), 2, "folder"},
                                         {"merge - " + raw + " -o " + quoted("m.dng"), 2, "more than once"},

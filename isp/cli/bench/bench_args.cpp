@@ -17,7 +17,7 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
       ->delimiter(',')
       ->allow_extra_args(false);
   app.add_option("--method", args.methods,
-                 "program to score: NAME='PROGRAM {in} {out}', or a known one such as dcraw; repeatable")
+                 "program to score: NAME='PROGRAM {in} {out}', or a known name such as dcraw; repeatable")
       ->type_name("NAME[=COMMAND]")
       ->allow_extra_args(false);
   add_seed(app, "--seed", "seed of the scenes and noise of the stage methods (default: 1)", args.seed);
@@ -25,32 +25,28 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
                     "time limit for each frame and program of the stage methods [s] (default: 120)", 0.1, 86400,
                     args.time_limit_s);
   CLI::Option* const shard = add_shard(
-      app,
-      "run every N-th stage from the I-th on; of methods, if that is the only one, every N-th light (default 1/1: all)",
+      app, "run every N-th stage, starting with the I-th; with --method every N-th light level (default 1/1: all)",
       args.shard);
   app.add_flag("--calibrate-cost", args.calibrate_cost,
-               "measure the speed of this machine for develop --budget-ms, and store it; 3 to 8 minutes")
+               "measure and store the speed of this machine for --budget-ms; takes 3 to 8 minutes")
       ->excludes("--stage")
       ->excludes("--method")
       ->excludes(shard);
   app.add_flag("--list", args.list, "list the stages");
-  app.add_option(
-         "-o,--output", args.output,
-         "folder, created if necessary, for the page bench.html, STAGE.csv, STAGE.json and parts of pictures (PNG)")
+  app.add_option("-o,--output", args.output,
+                 "folder for bench.html, STAGE.csv, STAGE.json and crops of images; created if necessary")
       ->type_name("DIR");
   add_choice<isp::PictureSet>(
       app, "--pictures",
       {{"held-out", isp::PictureSet::held_out}, {"tuning", isp::PictureSet::tuning}, {"all", isp::PictureSet::all}},
       [&args](isp::PictureSet set) { args.pictures = set; },
-      "set of clean pictures to use; parameters are chosen on the tuning set (default: held-out)");
+      "set of clean images; the parameters of lowlux were chosen on the tuning set (default: held-out)");
   app.add_option("--pictures-folder", args.pictures_folder,
-                 "folder of the clean pictures (default: pictures next to the command, as its build makes them)")
+                 "folder with the clean images (default: the folder pictures next to the command)")
       ->type_name("DIR");
-  app.add_flag(
-      "--quick", args.quick,
-      "use parts of two pictures in two lights, as a quick test: less than a minute on two cores, no final figures");
-  app.add_option("--threads", args.threads,
-                 "number of threads for work that is not timed (default: one for each processor)")
+  app.add_flag("--quick", args.quick,
+               "quick test on crops of two images at two light levels, in less than a minute on two cores");
+  app.add_option("--threads", args.threads, "number of threads for work that is not timed (default: one per processor)")
       ->check(CLI::Range(1, 256))
       ->type_name("N");
   app.add_flag("--json", args.json, "print JSON instead of tables");

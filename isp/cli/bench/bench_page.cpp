@@ -82,13 +82,13 @@ isp::ReportSection measured_part(const isp::BenchTable& table) {
   part.table.marked = undominated_rows(table);
   if (!part.table.marked.empty()) {
     part.text =
-        "Rows with a tinted background are undominated: no other row is faster and as good, or better and as fast.";
+        "Rows with a tinted background are Pareto-optimal: no other row is faster and as good, or better and as fast.";
   }
   return part;
 }
 
 isp::ReportSection findings_part(const std::vector<isp::Finding>& findings) {
-  isp::ReportSection part{.title = "What it must show", .table = isp::table_of(findings), .is_part = true};
+  isp::ReportSection part{.title = "Expectations", .table = isp::table_of(findings), .is_part = true};
   for (std::size_t i = 0; i < findings.size(); ++i) {
     if (!findings[i].holds) part.table.marked.push_back(i);
   }

@@ -225,7 +225,7 @@ std::string findings_text(std::span<const isp::Finding> findings) {
     if (f.holds && !f.direction_only) continue;
     for (const std::string& line : wrapped(f.claim + ": " + f.note, note_width)) out += fmt::format("    {}\n", line);
   }
-  out += fmt::format("published findings: {}\nchecks of our own: {}\n",
+  out += fmt::format("published findings: {}\nadditional checks: {}\n",
                      isp::count_of_verdicts(findings, isp::Finding::Kind::published),
                      isp::count_of_verdicts(findings, isp::Finding::Kind::check));
   for (const std::string& line : wrapped(std::string(isp::tolerance_of_verdicts), note_width)) out += line + '\n';

@@ -51,7 +51,7 @@ Result<void> check_method_names(const std::vector<isp::ScoredMethod>& methods) {
   std::set<std::string> names{isp::name_of_noise_free, isp::name_of_noisy};
   for (const isp::ScoredMethod& method : methods) {
     if (names.insert(method.name).second) continue;
-    return fail(ErrorCode::invalid_argument, fmt::format("two rows would have the name '{}'", method.name), "--method");
+    return fail(ErrorCode::invalid_argument, fmt::format("two methods have the name '{}'", method.name), "--method");
   }
   return {};
 }
@@ -60,10 +60,9 @@ Result<isp::BenchOptions> bench_options(const BenchArgs& args) {
   const std::string folder = pictures_folder(args.pictures_folder);
   std::error_code ignored;
   if (!std::filesystem::is_directory(folder, ignored)) {
-    return fail(
-        ErrorCode::not_found,
-        "there is no such folder of pictures: --pictures-folder names the testdata/pictures of lowlux's sources",
-        folder);
+    return fail(ErrorCode::not_found,
+                "there is no such folder of images: --pictures-folder names the testdata/pictures of lowlux's sources",
+                folder);
   }
   isp::BenchOptions options{.pictures_folder = folder, .pictures = args.pictures, .quick = args.quick};
   options.command_limits.max_wall_s = args.time_limit_s;

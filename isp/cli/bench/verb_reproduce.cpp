@@ -79,15 +79,15 @@ std::vector<isp::Finding> findings_of(const std::vector<Done>& done) {
 std::vector<TextFile> files_of(const std::vector<Done>& done, const ReproduceArgs& args) {
   const std::vector<isp::Finding> findings = findings_of(done);
   std::vector<TextFile> out{{"findings.csv", isp::csv_of(isp::table_of(findings))}};
-  isp::Report report{"lowlux reproduce: published experiments and ours",
-                     fmt::format("Seed {}{}. Each published finding is listed next to the same quantity computed here, "
-                                 "each check of our own next to what is expected. Verdicts: {}; where only the order "
-                                 "or the sign of a claim is found, the verdict is 'same direction'. Published "
-                                 "findings: {}. Checks of our own: {}.",
-                                 args.seed, args.quick ? ", quick: fewer samples" : "", isp::tolerance_of_verdicts,
-                                 isp::count_of_verdicts(findings, isp::Finding::Kind::published),
-                                 isp::count_of_verdicts(findings, isp::Finding::Kind::check)),
-                     {}};
+  isp::Report report{
+      "lowlux reproduce: published findings and results of lowlux",
+      fmt::format("Seed {}{}. Each published finding is listed next to the same quantity computed by lowlux, each "
+                  "additional check next to the expected value. Verdicts: {}; if only the order or the sign of a claim "
+                  "agrees, the verdict is 'same direction'. Published findings: {}. Additional checks: {}.",
+                  args.seed, args.quick ? ", quick: fewer samples" : "", isp::tolerance_of_verdicts,
+                  isp::count_of_verdicts(findings, isp::Finding::Kind::published),
+                  isp::count_of_verdicts(findings, isp::Finding::Kind::check)),
+      {}};
   for (const Done& d : done) {
     report.sections.push_back(
         {std::string(d.experiment.title), {}, isp::table_of(d.outcome.findings), d.outcome.plots});

@@ -132,7 +132,7 @@ isp::Plot plot_of_temperature(const calib::DarkSeries& series, const std::string
 
 std::string fit_text(const calib::DarkSeries& series) {
   if (series.degrees_of_freedom == 0)
-    return "exact, as it has as many parameters as settings: add a third exposure time";
+    return "exact, because the number of parameters equals the number of settings: add a third exposure time";
   return fmt::format("mean square of residual / error {:.3g}, {} degrees of freedom", series.reduced_chi_square,
                      series.degrees_of_freedom);
 }
@@ -172,13 +172,13 @@ void show_black(const calib::BlackFigures& black, const calib::FrameSetting& set
   };
   out.add("row means", cells(black.rows, scatter));
   out.add("column means", cells(black.columns, scatter));
-  out.add("", fmt::format("standard deviation in DN{}; in brackets what white noise alone would give",
+  out.add("", fmt::format("standard deviation in DN{}; in brackets the value for white noise",
                           black.frames == 1 ? "" : " of the mean of the frames"));
   out.add("row noise", fmt::format("{:.3g} DN, column noise {:.3g} DN beyond white noise", black.row_noise_dn,
                                    black.column_noise_dn));
-  out.add("pixels", fmt::format("{} in {} frame{}, {:.2g} % left out", black.pixels, black.frames,
+  out.add("pixels", fmt::format("{} in {} frame{}, {:.2g} % of the pixels not used", black.pixels, black.frames,
                                 black.frames == 1 ? "" : "s", 100 * black.excluded_fraction));
-  out.add("holds", fmt::format("pedestal including dark charge{}: a second exposure time would separate them",
+  out.add("holds", fmt::format("pedestal including dark charge{}: they can be separated with a second exposure time",
                                setting.exposure_s ? fmt::format(", at {:g} s", *setting.exposure_s) : ""));
   found.text += name_of_gain(setting) + "\n" + out.text();
 
@@ -219,8 +219,9 @@ void show_dark_series(const calib::DarkSeries& series, std::span<const calib::Da
     out.add("dark colour", "not measurable: the dark current is too small");
   }
   if (series.law) out.add("doubling", fmt::format("every {} C", text_of(series.law->doubling_c)));
-  out.add("read noise", series.read_noise_e ? text_of(*series.read_noise_e) + " e-"
-                                            : std::string("not measurable: below quantisation and dark charge"));
+  out.add("read noise", series.read_noise_e
+                            ? text_of(*series.read_noise_e) + " e-"
+                            : std::string("not measurable: smaller than quantisation noise and dark charge"));
   out.add("patterns", fmt::format("DSNU {:.3g} of the dark current, row noise {:.3g} e-, column noise {:.3g} e-",
                                   series.dsnu.value, series.row_noise_e, series.column_noise_e));
   out.add("hot pixels", std::to_string(series.hot.size()));

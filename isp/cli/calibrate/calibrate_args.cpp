@@ -16,7 +16,7 @@ namespace {
 
 void add_output(CLI::App& app, CalibrateArgs& args) {
   app.add_option("-o,--output", args.output, "profile to write (JSON)")->required()->type_name("PROFILE.json");
-  app.add_option("--add-to", args.add_to, "start from this profile: new measurements replace its values")
+  app.add_option("--add-to", args.add_to, "profile to which the measurements are added; they replace its values")
       ->type_name("PROFILE.json");
   app.add_option("--report", args.report, "write a page with tables and plots")->type_name("PAGE.html");
   app.add_flag("--force", args.force, "overwrite files that exist");
@@ -73,7 +73,7 @@ std::optional<int> expand(const CalibrateArgs& args, std::vector<std::string>& f
 }  // namespace
 
 Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>& words) {
-  CLI::App app("Pedestal, dark current, its temperature law and hot pixels from dark frames.",
+  CLI::App app("Measures pedestal, dark current, its temperature law and hot pixels on dark frames.",
                "lowlux calibrate black");
   app.footer(
       "Frames are grouped by gain, exposure time and temperature. Two exposure times separate dark current from the "
@@ -101,15 +101,16 @@ Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>&
 }
 
 Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>& words) {
-  CLI::App app("System gain, read noise, full well, PRNU and linearity by photon transfer (EMVA 1288).",
-               "lowlux calibrate noise");
+  CLI::App app(
+      "Measures system gain, read noise, full well, PRNU and linearity by the photon transfer method of EMVA 1288.",
+      "lowlux calibrate noise");
   app.footer(
       "Two flats of the same light form a pair, and a fit needs four pairs of different light. Frames are paired by "
       "gain, exposure time and level, in the given order. All darks have one exposure time, best a short one. Without "
       "--darks the input is one ordinary image, and noise is measured in its even areas.");
   CalibrateNoiseArgs args;
   app.add_option("FRAMES", args.common.frames,
-                 "flats in pairs: files, a folder or a quoted pattern; or one ordinary picture")
+                 "flats in pairs: files, a folder or a quoted pattern; or one ordinary image")
       ->required();
   app.add_option("--darks", args.darks, "two or more dark frames: files, a folder or a quoted pattern; repeatable")
       ->type_name("FILE[,FILE...]|FOLDER")
@@ -117,7 +118,7 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
   add_output(app, args.common);
   add_settings(app, args.common);
   app.add_flag("--steady-light", args.steady_light,
-               "the lamp was constant, so that the exposure times of the flats measure linearity");
+               "the light was constant: measure linearity by the exposure times of the flats");
   using Method = calib::PictureNoiseMethod;
   add_choice<Method>(
       app, "--method", {{"ponomarenko", Method::ponomarenko}, {"foi", Method::foi}},
@@ -128,10 +129,10 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
     if (const auto code = expand(args.common, *files)) return *code;
   }
   if (args.darks.empty() && args.common.frames.size() > 1) {
-    return refuse(app, "several flats need --darks; without darks one picture is measured");
+    return refuse(app, "several flats need --darks; without --darks, one ordinary image is expected");
   }
-  if (args.darks.empty() && args.steady_light) return refuse(app, "--steady-light: it is for flats");
-  if (!args.darks.empty() && args.method) return refuse(app, "--method: it is for one picture, without --darks");
+  if (args.darks.empty() && args.steady_light) return refuse(app, "--steady-light applies to flats");
+  if (!args.darks.empty() && args.method) return refuse(app, "--method applies to one ordinary image, without --darks");
   if (args.darks.size() == 1) return refuse(app, one_dark(args.darks.front()));
   std::vector<std::string> inputs = args.common.frames;
   inputs.insert(inputs.end(), args.darks.begin(), args.darks.end());
@@ -164,7 +165,7 @@ void add_light(CLI::App& app, LightOptions& light) {
              [&light](double value) { light.irradiance_w_per_m2 = value; });
   add_number(app, "--wavelength", "NM", "wavelength of the light of --irradiance",
              [&light](double value) { light.wavelength_nm = value; });
-  add_number(app, "--pixel-pitch", "UM", "side of a pixel, with --irradiance",
+  add_number(app, "--pixel-pitch", "UM", "pixel pitch in micrometres, with --irradiance",
              [&light](double value) { light.pixel_pitch_um = value; });
 }
 
@@ -172,7 +173,7 @@ void add_light(CLI::App& app, LightOptions& light) {
 
 Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>& words) {
   CLI::App app(
-      "A data sheet of the sensor by EMVA 1288 release 4.0, from flats and darks: a page, and JSON next to it.",
+      "Makes a data sheet of a sensor by EMVA 1288 release 4.0, as an HTML page and JSON, from flats and darks.",
       "lowlux calibrate sheet");
   app.footer(
       "Two flats of the same light form a pair. Four or more pairs of different light are needed, and should reach "
@@ -187,12 +188,11 @@ Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>&
       ->required()
       ->type_name("FILE[,FILE...]|FOLDER")
       ->allow_extra_args(false);
-  app.add_option("-o,--output", args.common.output,
-                 "page to write; the figures are written next to it, with the extension .json")
+  app.add_option("-o,--output", args.common.output, "page to write; the figures are also written next to it as .json")
       ->required()
       ->type_name("SHEET.html");
   app.add_flag("--steady-light", args.steady_light,
-               "the lamp was constant, so that the exposure times of the flats measure linearity");
+               "the light was constant: measure linearity by the exposure times of the flats");
   add_light(app, light);
   add_settings(app, args.common);
   app.add_flag("--force", args.common.force, "overwrite files that exist");
@@ -203,7 +203,7 @@ Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>&
     if (const auto code = expand(args.common, *files)) return *code;
   }
   if (light.any() && !light.all_positive()) {
-    return refuse(app, "--irradiance, --wavelength and --pixel-pitch belong together, and are above 0");
+    return refuse(app, "--irradiance, --wavelength and --pixel-pitch must be given together, and be above 0");
   }
   if (light.any()) args.irradiance = light.light();
   if (args.darks.size() == 1) return refuse(app, one_dark(args.darks.front()));
@@ -217,7 +217,7 @@ Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>&
 }
 
 Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string>& words) {
-  CLI::App app("The profile of a sensor whose figures are published; `lowlux simulate --list` names them.",
+  CLI::App app("Makes a profile from the published figures of a sensor; `lowlux simulate --list` lists the sensors.",
                "lowlux calibrate quoted");
   CalibrateQuotedArgs args;
   app.add_option("SENSOR", args.common.frames,
@@ -237,9 +237,10 @@ namespace {
 /// Returns the error of the output files; empty if there is none.
 std::string wrong_files(const CalibrateColourArgs& args) {
   if (args.output.empty()) return "-o is required: the profile to write";
-  if (!args.output.ends_with(".json")) return fmt::format("-o: profiles are .json, not {}", args.output);
+  if (!args.output.ends_with(".json"))
+    return fmt::format("-o: the name of a profile must end with .json, found {}", args.output);
   if (!args.report.empty() && !args.report.ends_with(".html")) {
-    return fmt::format("--report: reports are .html, not {}", args.report);
+    return fmt::format("--report: the name of a page must end with .html, found {}", args.report);
   }
   if (!args.overlay.empty()) {
     const auto format = isp::format_of(args.overlay);
@@ -252,36 +253,40 @@ std::string wrong_files(const CalibrateColourArgs& args) {
 
 std::string wrong(const CalibrateColourArgs& args) {
   if (args.chart.empty() == args.camera.empty()) {
-    return "give a photographed chart, or --camera with spectral sensitivities";
+    return "name a raw file that shows a chart, or spectral sensitivities with --camera";
   }
-  if (args.chart.empty() && !args.overlay.empty()) return "--overlay: it shows a photographed chart";
-  if (args.chart.empty() && args.preserve_white) return "--preserve-white: it is for a photographed chart";
-  if (args.chart.empty() && args.even_light) return "--even-light: it is for a photographed chart";
-  if (!args.chart.empty() && args.per_photon) return "--per-photon: it is for spectral sensitivities (--camera)";
+  if (args.chart.empty() && !args.overlay.empty()) return "--overlay applies to a photographed chart, not to --camera";
+  if (args.chart.empty() && args.preserve_white)
+    return "--preserve-white applies to a photographed chart, not to --camera";
+  if (args.chart.empty() && args.even_light) return "--even-light applies to a photographed chart, not to --camera";
+  if (!args.chart.empty() && args.per_photon) return "--per-photon requires --camera";
   return wrong_files(args);
 }
 
 }  // namespace
 
 Parsed<CalibrateColourArgs> parse_calibrate_colour(const std::vector<std::string>& words) {
-  CLI::App app("A camera's colour matrix from a photographed ColorChecker or from its spectral sensitivities.",
-               "lowlux calibrate colour");
+  CLI::App app(
+      "Determines the colour matrix of a camera from a photographed ColorChecker or from spectral sensitivities.",
+      "lowlux calibrate colour");
   CalibrateColourArgs args;
-  app.add_option("CHART", args.chart, "raw file that shows one complete ColorChecker Classic")->type_name("");
+  app.add_option("CHART", args.chart, "raw file of a photograph of one complete ColorChecker Classic")->type_name("");
   app.add_option("--camera", args.camera,
                  "instead of a chart: spectral sensitivities, by name (`lowlux simulate --list`) or a table of "
                  "wavelength, R, G, B")
       ->type_name("NAME|FILE.csv");
-  app.add_flag("--per-photon", args.per_photon, "the table is quantum efficiency, not response per unit of power");
+  app.add_flag("--per-photon", args.per_photon,
+               "the table of --camera is quantum efficiency, not response per unit of power");
   app.add_option("--illuminant", args.illuminant,
-                 "light on the chart: a CIE illuminant, a lamp, or a table (default: of A, D50, D55, D65 and D75 the "
-                 "one nearest to the chart's neutral; D50 if the file has no matrix, and with --camera)")
+                 "light on the chart: a CIE illuminant, a lamp, or a table (default: the one of A, D50, D55, D65, D75 "
+                 "that is nearest to the grey patches; D50 with --camera or without a matrix in the file)")
       ->type_name("NAME|FILE.csv");
   app.add_flag("--preserve-white", args.preserve_white,
-               "map the mean colour of the grey row exactly to the white of the light");
-  app.add_flag("--even-light", args.even_light, "assume even light: do not fit its fall-off over the chart");
+               "constrain the fit to map the mean of the grey patches exactly to the white of the light");
+  app.add_flag("--even-light", args.even_light, "assume even light on the chart instead of fitting its gradient");
   app.add_option("-o,--output", args.output, "profile to write")->type_name("PROFILE.json");
-  app.add_option("--add-to", args.add_to, "profile whose other values are kept")->type_name("PROFILE.json");
+  app.add_option("--add-to", args.add_to, "profile to which the measurements are added; they replace its values")
+      ->type_name("PROFILE.json");
   app.add_option("--report", args.report, "write a page with tables and plots")->type_name("PAGE.html");
   app.add_option("--overlay", args.overlay, "write an image that shows where patches were measured")
       ->type_name("FILE.png");

@@ -121,8 +121,8 @@ void warn_of_light(const calib::DarkGroup& group, const Darks& darks, std::vecto
                  fraction = (level_dn - black_dn) / (tagged->white_dn - black_dn);
     if (fraction > much_light) {
       warnings.push_back(fmt::format(
-          "the frames{} are {:.0f} % of the range above the black level of their files: if this is not dark charge but "
-          "light, cover the lens and take them again",
+          "the frames{} are {:.0f} % of the range above the black level of their files: if light reached the sensor, "
+          "cover the lens and take them again",
           group.setting.exposure_s ? fmt::format(" of {:g} s", *group.setting.exposure_s) : "", 100 * fraction));
     }
   }
@@ -138,9 +138,8 @@ void warn_of_light(const calib::DarkGroup& group, const Darks& darks, std::vecto
 void warn_of_law(const calib::DarkSeries& series, std::vector<std::string>& warnings) {
   if (!series.law || !(series.law->misfit > 0)) return;
   warnings.push_back(
-      fmt::format("from {:g} to {:g} C the dark current does not double with a fixed number of degrees: the profile is "
-                  "off by up to "
-                  "{:.2g} %; use darks of the temperatures of the images only",
+      fmt::format("from {:g} to {:g} C the dark current does not double at a constant temperature interval: the "
+                  "profile has errors of up to {:.2g} %; use only darks of the temperatures of the images",
                   series.law->lowest_c, series.law->highest_c, 100 * series.law->misfit));
 }
 
@@ -194,12 +193,12 @@ Result<void> calibrate_black_level(const calib::DarkSet& set, const calib::Measu
                                    const CalibrateBlackArgs& args, Calibration& found) {
   if (set.groups.size() > 1) {
     return fail(ErrorCode::insufficient,
-                fmt::format("the darks have one exposure time at {} temperatures: dark current needs a second exposure "
-                            "time, a black level frames of one temperature",
+                fmt::format("the darks have one exposure time and {} temperatures: add a second exposure time to "
+                            "measure dark current, or use one temperature to measure the black level",
                             set.groups.size()));
   }
   if (!args.map.empty()) {
-    found.warnings.emplace_back("one exposure time does not determine dark current: --map has no effect");
+    found.warnings.emplace_back("--map has no effect: dark current needs a second exposure time");
   }
   const calib::DarkGroup& group = set.groups.front();
   const auto black = calib::measure_black(group, gain_dn_per_e);

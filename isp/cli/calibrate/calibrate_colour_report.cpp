@@ -80,7 +80,7 @@ std::string facts(const ColourOutcome& o) {
     fmt::format_to(
         out, "  chart           corners ({:.0f}, {:.0f}) ({:.0f}, {:.0f}) ({:.0f}, {:.0f}) ({:.0f}, {:.0f})\n",
         corner[0].x, corner[0].y, corner[1].x, corner[1].y, corner[2].x, corner[2].y, corner[3].x, corner[3].y);
-    fmt::format_to(out, "  light on it     {:+.1f} % from its centre to its right, {:+.1f} % to its lower edge\n",
+    fmt::format_to(out, "  light gradient  {:+.1f} % from the centre to the right edge, {:+.1f} % to the lower edge\n",
                    100 * o.chart->light.per_x, 100 * o.chart->light.per_y);
     fmt::format_to(out, "  neutral         {:.4f} {:.4f} {:.4f}\n", o.chart->neutral[0], o.chart->neutral[1],
                    o.chart->neutral[2]);

@@ -82,7 +82,7 @@ Result<Light> choose_light(const CalibrateColourArgs& args, const std::optional<
     distance = apart;
     nearest = name;
   }
-  return light_from(nearest, fmt::format("nearest to the chart's neutral, {:.0f} K by the file's own matrix", *cct_k));
+  return light_from(nearest, fmt::format("nearest to the grey patches, {:.0f} K by the matrix of the file", *cct_k));
 }
 
 /// Returns the errors of the usable patches at their positions among all patches.
@@ -116,7 +116,7 @@ class ChartCalibration {
  private:
   Result<void> find_light() {
     const auto neutral = calib::chart_neutral(chart_.found.patches, {});
-    if (!neutral) return fail(ErrorCode::insufficient, "the chart's grey row cannot be measured: is it clipped?");
+    if (!neutral) return fail(ErrorCode::insufficient, "the grey row of the chart cannot be measured: is it clipped?");
     chart_.neutral = *neutral;
     if (const auto white = isp::white_of_neutral(frame_.colour, *neutral)) chart_.neutral_cct_k = white->cct_k;
     auto light = choose_light(args_, chart_.neutral_cct_k);

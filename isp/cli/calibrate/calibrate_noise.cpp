@@ -95,11 +95,11 @@ Result<Calibration> calibrate_flats(const CalibrateNoiseArgs& args) {
   if (!read) return tl::make_unexpected(read.error());
   for (const FramePairs* pairs : {&darks, &flats}) {
     for (const std::string& file : pairs->alone()) {
-      found.warnings.push_back(file + " has no partner of the same exposure time and level: it is not used");
+      found.warnings.push_back(file + " is not used: there is no second flat of the same exposure time and level");
     }
   }
   found.report.title = camera_name(found.profile.make, found.profile.model) + ": photon transfer";
-  if (flats.pairs().empty()) return fail(ErrorCode::insufficient, "no two flats make a pair; take two of each light");
+  if (flats.pairs().empty()) return fail(ErrorCode::insufficient, "no two flats form a pair; take two of each light");
   for (const auto& iso : isos_of(flats.pairs())) {
     const auto done = calibrate_gain(of_iso(darks.pairs(), iso), of_iso(flats.pairs(), iso), args, found);
     if (!done) return tl::make_unexpected(done.error());
@@ -194,7 +194,8 @@ Result<void> FramePairs::add(RawDn frame, const std::string& file) {
   if (partner == waiting_.end()) {
     if (waiting_.size() == max_waiting) {
       return fail(ErrorCode::insufficient,
-                  fmt::format("{} frames found no partner of the same exposure time and level; take two of each light",
+                  fmt::format("{} frames are not used, because there is no second flat of the same exposure time and "
+                              "level; take two of each light",
                               max_waiting),
                   file);
     }

@@ -117,7 +117,7 @@ Result<std::vector<FramePair>> read_pairs(const std::vector<std::string>& files,
     if (auto added = pairs.add(*std::move(raw), file); !added) return tl::make_unexpected(added.error());
   }
   for (const std::string& file : pairs.alone()) {
-    found.warnings.push_back(file + " has no partner of the same exposure time and level: it is not used");
+    found.warnings.push_back(file + " is not used: there is no second flat of the same exposure time and level");
   }
   return pairs.pairs();
 }
@@ -181,7 +181,7 @@ Result<calib::SheetFrames> read_sheet_frames(const CalibrateSheetArgs& args, Cal
   if (!darks) return tl::make_unexpected(darks.error());
   const auto flats = read_pairs(args.common.frames, "flat", *darks, reader, found);
   if (!flats) return tl::make_unexpected(flats.error());
-  if (flats->empty()) return fail(ErrorCode::insufficient, "no two flats make a pair; take two of each light");
+  if (flats->empty()) return fail(ErrorCode::insufficient, "no two flats form a pair; take two of each light");
   out.dark_pairs = statistics_of(*darks);
   out.flat_pairs = statistics_of(*flats);
   const auto transfer = calib::fit_photon_transfer(out.dark_pairs, out.flat_pairs);

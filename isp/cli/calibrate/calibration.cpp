@@ -67,7 +67,7 @@ Result<RawFrame> read_calibration_frame(const std::string& file, const Calibrate
 Result<void> put_camera(const FrameInfo& info, CameraProfile& profile) {
   if (!may_be_same_camera({profile.make, profile.model}, {info.make, info.model})) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format(R"(the profile is of "{}", what is to be added of "{}")",
+                fmt::format(R"(the profile is of "{}", the added frames are of "{}")",
                             camera_name(profile.make, profile.model), camera_name(info.make, info.model)));
   }
   if (profile.make.empty()) profile.make = info.make;

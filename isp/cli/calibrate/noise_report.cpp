@@ -25,14 +25,13 @@ std::string optional_text(const std::optional<Estimate>& e, const char* unit, co
 
 std::string saturation_text(const calib::PhotonTransfer& t) {
   if (!t.saturation) {
-    return t.saturation_capacity_e
-               ? fmt::format("{:.5g} e- where the variance is largest; no flat reaches the full well",
-                             t.saturation_capacity_e->value)
-               : "not reached by the flats";
+    return t.saturation_capacity_e ? fmt::format("{:.5g} e- at the largest variance; no flat reaches the full well",
+                                                 t.saturation_capacity_e->value)
+                                   : "not reached by the flats";
   }
   const bool well = t.saturation->limited_by == calib::Saturation::LimitedBy::full_well;
   return fmt::format("{} e-, {}", text_of(t.saturation->charge_e),
-                     well ? "the pixels are full" : "the converter's range ends");
+                     well ? "the full well of the pixels" : "the largest code of the converter");
 }
 
 /// Returns values by name, for text and table alike.
@@ -44,15 +43,14 @@ std::vector<std::pair<const char*, std::string>> figures_of(const calib::PhotonT
        fmt::format("{:.5g} {:.5g} {:.5g} {:.5g} DN/e-, reduced chi square {:.3g}", t.gain_of_site_dn_per_e[0].value,
                    t.gain_of_site_dn_per_e[1].value, t.gain_of_site_dn_per_e[2].value, t.gain_of_site_dn_per_e[3].value,
                    t.reduced_chi_square_of_sites)},
-      {"read noise", optional_text(t.read_noise_e, " e-", "unknown: the darks scatter by less than half a code")},
+      {"read noise", optional_text(t.read_noise_e, " e-", "unknown: the noise of the darks is less than half a code")},
       {"row noise", fmt::format("{:.3g} e-", t.row_noise_e)},
       {"black [DN]", fmt::format("{:.3f} {:.3f} {:.3f} {:.3f}", b[0], b[1], b[2], b[3])},
       {"full well", saturation_text(t)},
       {"PRNU", fmt::format("{:.3g} +- {:.2g} %", 100 * t.prnu.value, 100 * t.prnu.standard_error)},
-      {"dark pattern", optional_text(t.dsnu_e, " e-", "unknown: the darks scatter by less than half a code")},
-      {"linearity", t.linearity_error
-                        ? fmt::format("{:.2g} % mean deviation from a line", 100 * *t.linearity_error)
-                        : std::string("not measured: this needs --steady-light and three exposure times")},
+      {"dark pattern", optional_text(t.dsnu_e, " e-", "unknown: the noise of the darks is less than half a code")},
+      {"linearity", t.linearity_error ? fmt::format("{:.2g} % mean deviation from a line", 100 * *t.linearity_error)
+                                      : std::string("not measured: needs --steady-light and three exposure times")},
       {"fit", fmt::format("reduced chi square {:.3g}, {} degrees of freedom, {} levels of light", t.reduced_chi_square,
                           t.degrees_of_freedom, t.levels)},
   };
@@ -149,10 +147,10 @@ Figures figures_of(const calib::PictureNoise& n, const RawFrame& frame, const Bl
       {"system gain", text_of(n.gain_dn_per_e) + " DN/e-"},
       {"offset", fmt::format("{} DN^2: {:.3g} e- of noise without light", text_of(n.offset_dn2),
                              read_dn / n.gain_dn_per_e.value)},
-      {"contrast", fmt::format("{:.2g} % of the light: sensitivities of the pixels, grain, fine texture",
-                               100 * std::sqrt(n.contrast_squared))},
+      {"contrast",
+       fmt::format("{:.2g} % of the signal: PRNU, grain and fine texture", 100 * std::sqrt(n.contrast_squared))},
       {"fit",
-       fmt::format("reduced chi square {:.3g}, {} degrees of freedom, {:.3g} % of the picture is flat, {:.4g} to "
+       fmt::format("reduced chi square {:.3g}, {} degrees of freedom, {:.3g} % of the image is flat, {:.4g} to "
                    "{:.4g} DN above black",
                    n.reduced_chi_square, n.degrees_of_freedom, 100 * n.flat_fraction, n.darkest_dn, n.brightest_dn)},
       {"codes",

@@ -168,8 +168,8 @@ isp::ReportSection sheet_section(const calib::DataSheet& sheet) {
 isp::ReportSection pattern_section(const calib::SheetFrames& frames, double gain) {
   isp::ReportSection out{
       .title = "Patterns",
-      .text = fmt::format("Averages of {} darks{}. White noise is flat in the spectrogram. The light must be even: it "
-                          "is not corrected, and no high-pass filter is applied.",
+      .text = fmt::format("Averages of {} darks{}. White noise has a flat spectrogram. The light must be even, because "
+                          "neither a correction nor a high-pass filter is applied.",
                           frames.darks.front().frames,
                           frames.bright ? fmt::format(" and of {} flats", frames.bright->frames) : "")};
   out.plots = {spectrogram_plot(frames, gain, calib::Direction::along_rows),

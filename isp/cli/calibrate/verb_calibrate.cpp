@@ -32,9 +32,9 @@ struct Kind {
 constexpr std::array kinds{
     Kind{"black", "pedestal, dark current and hot pixels from dark frames, or from masked pixels", run_calibrate_black},
     Kind{"colour", "colour matrices from a photographed chart or spectral sensitivities", run_calibrate_colour},
-    Kind{"noise", "gain, read noise, full well from flats, or noise from one picture", run_calibrate_noise},
-    Kind{"quoted", "the profile of a sensor whose figures are published", run_calibrate_quoted},
-    Kind{"sheet", "a data sheet of the sensor by EMVA 1288, from flats and darks", run_calibrate_sheet},
+    Kind{"noise", "gain, read noise and full well from flats, or noise from one ordinary image", run_calibrate_noise},
+    Kind{"quoted", "a profile from the published figures of a sensor", run_calibrate_quoted},
+    Kind{"sheet", "a data sheet by EMVA 1288, from flats and darks", run_calibrate_sheet},
 };
 
 void print_help() {
@@ -65,10 +65,8 @@ Result<CameraProfile> profile_of_file(const std::string& file) {
   const std::string name = std::filesystem::path(file).filename().string();
   auto sensor = calib::tuned_sensor(name);
   if (!sensor) {
-    return fail(
-        ErrorCode::invalid_argument,
-        "the name of a tuning file must be that of its sensor, such as imx477.json, and this sensor is not known",
-        file);
+    return fail(ErrorCode::invalid_argument, "a tuning file must be named after a known sensor, such as imx477.json",
+                file);
   }
   const auto bytes = capture::read_file_bytes(file, calib::max_tuning_bytes);
   if (!bytes) return tl::make_unexpected(bytes.error());
@@ -126,9 +124,8 @@ int run_calibrate(const std::vector<std::string>& words) {
   std::ranges::transform(kinds, names.begin(), &Kind::name);
   const bool is_unnamed = first.empty() || first.starts_with('-');
   const std::string wrong =
-      is_unnamed
-          ? fmt::format("name what to calibrate: {}, before any option; --help describes them", fmt::join(names, ", "))
-          : fmt::format("unknown kind '{}'{}; --help lists them", first, suggestion(first, names));
+      is_unnamed ? fmt::format("the first argument must be one of {}; --help describes them", fmt::join(names, ", "))
+                 : fmt::format("unknown kind '{}'{}; --help lists them", first, suggestion(first, names));
   return print_usage_error("calibrate", {ErrorCode::invalid_argument, wrong, {}}, failure_json("calibrate", words));
 }
 

@@ -81,7 +81,7 @@ void add_source(CLI::App& app, CaptureArgs& args) {
       ->type_name("ID");
   capture::CameraRequest& request = args.request;
   add_text(app, "--format", "FORMAT",
-           "raw format, by V4L2's or libcamera's name (RG10, SRGGB10_CSI2P...; default: the one with most bits)",
+           "raw format, by its name in V4L2 or libcamera (RG10, SRGGB10_CSI2P...; default: the one with most bits)",
            [&request](const std::string& text) { return set_format(text, request); });
   add_text(app, "--size", "WxH", "size of the frames (default: the largest)",
            [&request](const std::string& text) { return set_size(text, request); });
@@ -89,10 +89,10 @@ void add_source(CLI::App& app, CaptureArgs& args) {
            store_positive(request.frame_rate_hz, 1e5, "Hz"));
   add_text(app, "--exposure-time", "S", "exposure time of a frame (default: the camera's setting)",
            store_positive(request.exposure_s, 1e5, "s"));
-  add_text(app, "--gain", "X", "analogue gain, a factor (default: the camera's setting)",
+  add_text(app, "--gain", "X", "analogue gain as a factor (default: the camera's setting)",
            store_positive(request.analogue_gain, 1e6, "x"));
   app.add_option("--gain-code", args.gain_code,
-                 "gain code of a V4L2 camera, whose driver does not state the factor of a code")
+                 "gain code of the driver, for V4L2 cameras that do not state their gain as a factor")
       ->type_name("CODE");
   add_text(app, "--flip", "h|v|hv",
            "flip the readout of the sensor horizontally, vertically or both (default: the camera's setting)",
@@ -105,7 +105,7 @@ void add_source(CLI::App& app, CaptureArgs& args) {
   add_choice<capture::V4l2Memory>(
       app, "--memory", {{"mmap", capture::V4l2Memory::mmap}, {"dma-buf", capture::V4l2Memory::dma_buf}},
       [&args](capture::V4l2Memory memory) { args.memory = memory; },
-      "how frames of a V4L2 camera are read, both without a copy (default: mmap)");
+      "how the buffers of a V4L2 camera are accessed (default: mmap)");
   app.add_option("--buffers", request.buffers, "number of frame buffers, 2 to 32 (default 4)")
       ->check(CLI::Range(2, 32));
 }
@@ -123,9 +123,9 @@ void add_frames(CLI::App& app, CaptureArgs& args, Words& words) {
     };
   };
   add_text(app, "--frames", "N",
-           "number of frames to take; 0: until stopped (default: 1 to a file, 0 to a folder and with --live)",
+           "number of frames to take, 0: until interrupted (default: 1 to a file; 0 to a folder and with --live)",
            store_whole([&words](double number) { words.frames = number; }));
-  add_text(app, "--skip", "N", "number of frames to leave out first, while exposure settles (default 0)",
+  add_text(app, "--skip", "N", "number of frames to discard first, while the exposure settles (default 0)",
            store_whole([&args](double number) { args.limits.skip = static_cast<std::uint64_t>(number); }));
   add_text(app, "--timeout", "S", "longest time to wait for a frame (default 5)",
            [&args](const std::string& text) -> Wrong {
@@ -140,12 +140,12 @@ void add_frames(CLI::App& app, CaptureArgs& args, Words& words) {
 
 void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
   app.add_option("-o,--output", args.develop.output,
-                 "image (.png .jpg .tif .exr .pfm) or raw file (.dng) to write, with -NNNN before the extension if "
-                 "there are several frames; or a folder (created if it ends with /)")
+                 "image (.png .jpg .tif .exr .pfm) or raw file (.dng) to write, numbered -NNNN if there are several "
+                 "frames; or a folder (created if it ends with /)")
       ->type_name("OUT");
-  app.add_option("--as", words.as, "type of the files in a folder: png (default), jpg, tif, exr, pfm or dng")
+  app.add_option("--as", words.as, "type of the files in a folder (default: png)")
       ->check(CLI::IsMember({"png", "jpg", "tif", "exr", "pfm", "dng"}));
-  app.add_flag("--raw", words.raw, "write raw files, as with --as dng");
+  app.add_flag("--raw", words.raw, "write raw files, like --as dng");
   app.add_flag("--live", words.live, "write video to standard output: YUV4MPEG2, which ffplay and ffmpeg read");
   app.add_flag("--temporal", args.temporal, "with --live: use previous frames for noise reduction");
   add_text(app, "--budget-ms", "MS",
@@ -181,8 +181,7 @@ std::optional<std::string> given_of(const CLI::App& app, std::span<const char* c
 Wrong wrong_for_raw(const CLI::App& app, const CaptureArgs& args) {
   auto given = given_of(app, of_pictures);
   if (!given) given = given_of(app, of_pictures_and_films);
-  if (given)
-    return *given + " applies to images: a raw file keeps the values of the camera, and `develop` has the option";
+  if (given) return *given + " does not apply to raw files: use it with `develop`";
   const isp::BlackChoice black = args.develop.options.black.choice;
   if (!args.develop.black_profile.empty() ||
       (black != isp::BlackChoice::automatic && black != isp::BlackChoice::given)) {
@@ -201,7 +200,7 @@ Wrong wrong_for_live(const CLI::App& app, const CaptureArgs& args) {
   if (options.exposure_offset_ev != 0) return "--exposure with --live must be auto or a number of EV";
   if (options.look.look == isp::Look::model) return "--look with --live must be camera or eye";
   if (options.denoise.mode == isp::DenoiseChoice::Mode::level && options.denoise.level == denoise::Level::best) {
-    return "--denoise best takes seconds for a frame: --live has up to high";
+    return "--denoise best takes seconds for each frame: with --live use up to high";
   }
   const isp::BlackChoice black = options.black.choice;
   if (!args.develop.black_profile.empty() ||
@@ -225,7 +224,8 @@ Wrong wrong_camera(const CaptureArgs& args) {
 Wrong set_kind(const Words& words, CaptureArgs& args) {
   const std::string& output = args.develop.output;
   if (words.live) {
-    if (!output.empty() || words.raw || !words.as.empty()) return "--live writes video to standard output: no files";
+    if (!output.empty() || words.raw || !words.as.empty())
+      return "--live writes video to standard output and no files: leave --output, --raw and --as out";
     args.kind = CaptureKind::live;
     return std::nullopt;
   }
@@ -245,7 +245,7 @@ Wrong set_kind(const Words& words, CaptureArgs& args) {
   std::string end = fs::path(output).extension().string();
   std::ranges::transform(end, end.begin(), ascii_lower);
   args.kind = end == ".dng" ? CaptureKind::raw : CaptureKind::pictures;
-  if (words.raw && args.kind != CaptureKind::raw) return "--raw writes .dng, not " + output;
+  if (words.raw && args.kind != CaptureKind::raw) return "--raw writes .dng files: name one instead of " + output;
   if (args.kind == CaptureKind::pictures) {
     if (const auto format = isp::format_of(output); !format) return format.error().message + " or .dng";
   }

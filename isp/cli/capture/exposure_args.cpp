@@ -61,7 +61,7 @@ void add_auto_exposure(CLI::App& app, AutoExposureArgs& args) {
       app, "--mains",
       {{"auto", isp::Mains::either}, {"50", isp::Mains::hz50}, {"60", isp::Mains::hz60}, {"off", isp::Mains::off}},
       [&args](isp::Mains mains) { args.mains = mains; },
-      "with --auto-exposure: mains frequency whose flicker is avoided (default auto: 50 and 60 Hz)");
+      "with --auto-exposure: mains frequency of flickering lamps (default: auto, 50 and 60 Hz)");
   add_text(app, "--clip", "FRACTION",
            "with --auto-exposure: upper limit of the fraction of clipped pixels in the fullest channel, noise included "
            "(default 0.001)",

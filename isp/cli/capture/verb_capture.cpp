@@ -206,7 +206,8 @@ int run_capture(const std::vector<std::string>& words) {
   }
   if (is_video && ::isatty(STDOUT_FILENO) == 1) {
     return print_usage_error(
-        "capture", {ErrorCode::invalid_argument, "writes video: pipe it to a player, | ffplay -", "--live"}, json);
+        "capture",
+        {ErrorCode::invalid_argument, "writes video to a terminal: pipe it to a player (| ffplay -)", "--live"}, json);
   }
   listen_to_signals();
   Capture capture(args);

@@ -14,8 +14,8 @@ Parsed<CompareArgs> parse_compare(const std::vector<std::string>& words) {
       "develop with --tone none --exposure 0 --space linear-srgb.",
       "lowlux compare");
   CompareArgs args;
-  app.add_option("A", args.reference, "reference picture (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
-  app.add_option("B", args.test, "picture of the same size")->required();
+  app.add_option("A", args.reference, "reference image (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
+  app.add_option("B", args.test, "image of the same size")->required();
   app.add_flag("--json", args.json, "print JSON instead of text");
   if (const auto code = parse_words(app, words)) return *code;
   return args;

@@ -53,7 +53,8 @@ Result<std::string> word_of(const ConfigLine& line, const CLI::Option& option, c
   if (option.get_expected_max() != 0) return flag + "=" + line.value;
   if (line.value == "yes") return flag;
   if (line.value == "no") return std::string();
-  return fail(ErrorCode::invalid_argument, fmt::format("{} is yes or no, not '{}'", line.option, line.value), place);
+  return fail(ErrorCode::invalid_argument, fmt::format("{} must be yes or no, not '{}'", line.option, line.value),
+              place);
 }
 
 Result<const CLI::Option*> option_of(const CLI::App& app, const ConfigLine& line, const std::string& place) {
@@ -138,11 +139,11 @@ Result<std::vector<ConfigLine>> parse_config(std::string_view text, const std::s
     if (line.starts_with('[') && line.ends_with(']')) {
       verb = trimmed(line.substr(1, line.size() - 2));
       if (!verb_help(verb).examples.empty()) continue;
-      return wrong(fmt::format("there is no verb '{}'; `lowlux --help` lists them", verb));
+      return wrong(fmt::format("unknown verb '{}'; `lowlux --help` lists the verbs", verb));
     }
     const std::size_t equals = line.find('=');
     const std::string_view option = trimmed(line.substr(0, equals));
-    if (equals == std::string_view::npos || option.empty()) return wrong("a line is [VERB] or option = value");
+    if (equals == std::string_view::npos || option.empty()) return wrong("a line must be [VERB] or option = value");
     if (verb.empty()) return wrong("a line [VERB], such as [develop], must come first");
     lines.push_back({verb, std::string(option), std::string(trimmed(line.substr(equals + 1))), number});
   }

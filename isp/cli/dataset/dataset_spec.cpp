@@ -59,14 +59,14 @@ const char* kind_text(SettingKind kind) {
 Result<Distribution> range_of(const SortedJson& range, const std::string& name, SettingKind kind,
                               const std::string& key) {
   Distribution out{.kind = name == "uniform" ? Distribution::Kind::uniform : Distribution::Kind::log_uniform};
-  if (kind == SettingKind::text) return wrong_key(key, fmt::format("texts have no {} range: use choice", name));
+  if (kind == SettingKind::text) return wrong_key(key, fmt::format("a text setting has no {} range: use choice", name));
   if (!range.is_array() || range.size() != 2 || !is_value(range[0], kind) || !is_value(range[1], kind)) {
     return wrong_key(key, fmt::format("{} is not [LOW, HIGH] with {} for each", name, kind_text(kind)));
   }
   out.low = range[0].get<double>(), out.high = range[1].get<double>();
   if (!std::isfinite(out.low) || !std::isfinite(out.high)) return wrong_key(key, "a limit of the range is not finite");
   if (out.low == out.high) {
-    return wrong_key(key, fmt::format("the range {} is empty: write the value in place of it", range.dump()));
+    return wrong_key(key, fmt::format("the range {} is empty: write the value instead", range.dump()));
   }
   if (out.low > out.high) {
     return wrong_key(key, fmt::format("the range {} is reversed: write the lower limit first", range.dump()));
@@ -202,7 +202,7 @@ Result<void> set_own_keys(const SortedJson& json, DatasetSpec& spec) {
   spec.first_index = *first, spec.count = *count, spec.mask = *mask, spec.truth_electrons = *electrons;
   spec.format = *format;
   for (const SortedJson& scene : json["scenes"]) {
-    if (!scene.is_string()) return wrong_key("scenes", fmt::format("{} is not a text", scene.dump()));
+    if (!scene.is_string()) return wrong_key("scenes", fmt::format("{} is not a string", scene.dump()));
     spec.scenes.push_back(scene.get<std::string>());
   }
   return {};

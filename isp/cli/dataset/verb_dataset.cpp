@@ -64,9 +64,10 @@ Result<void> claim_folder(const DatasetSpec& spec, const std::string& folder, bo
   auto written = isp::write_text(file, text, force ? isp::Overwrite::yes : isp::Overwrite::no);
   // Another shard may have written the file meanwhile.
   if (written || written.error().code != ErrorCode::exists || same()) return written ? written : Result<void>{};
-  return fail(ErrorCode::exists,
-              "states another spec or version of lowlux: choose another folder, or replace its samples with --force",
-              file);
+  return fail(
+      ErrorCode::exists,
+      "was made with another spec or version of lowlux: choose another folder, or replace its samples with --force",
+      file);
 }
 
 /// Writes manifest-I-of-N.json: the files of each sample of a shard with their sizes and SHA-256. Samples go to the
@@ -185,7 +186,7 @@ class ShardRun {
     auto manifest = Manifest::create(spec_, args_.shard, args_.output);
     if (!manifest) return tl::make_unexpected(manifest.error());
     const InterruptionReport report([this] {
-      return fmt::format("the same command continues after {} of {} samples", done_.load(), out_.samples);
+      return fmt::format("{} of {} samples are complete: repeat the command to continue", done_.load(), out_.samples);
     });
     for (std::uint64_t i = 0; i < out_.samples; ++i) {
       const std::uint64_t index = index_in(spec_, args_.shard, i);

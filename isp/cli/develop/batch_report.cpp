@@ -33,7 +33,7 @@ void print_counts(const DevelopArgs& args, const BatchCounts& counts, std::chron
                                                        counts.files, args.output, took.count()))));
   }
   if (counts.files == 0 && !args.quiet) {
-    print_err(fmt::format("lowlux: no raw file falls to shard {}/{}\n", args.shard.number, args.shard.count));
+    print_err(fmt::format("lowlux: shard {}/{} contains no raw file\n", args.shard.number, args.shard.count));
   }
   if (counts.skipped > 0 && !args.quiet) {
     print_err(fmt::format("lowlux: {} of {} files skipped: their outputs exist\n", counts.skipped, counts.files));

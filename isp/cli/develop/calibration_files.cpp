@@ -73,7 +73,7 @@ Result<void> use_flat(const calib::FlatField& flat, RawFrame& picture) {
   calib::FrameSetting of_flats = flat.setting;
   of_flats.iso = setting->iso;  // neither vignetting nor response depends on the gain
   if (auto same = calib::check_same_camera(*setting, of_flats, "the flat frame"); !same) {
-    same.error().message += "; the first frame is the image: take flats with its camera and size";
+    same.error().message += "; the first frame is the image: take flats with the same camera and image size";
     return same;
   }
   const auto& f_number = picture.raw.info.f_number;

@@ -120,14 +120,15 @@ Result<isp::CostModel> parse_cost(std::string_view text) {
   isp::CostModel model;
   model.machine = machine.get<std::string>();
   const auto count = threads.get<std::int64_t>();
-  if (count < 1 || count > std::numeric_limits<int>::max()) return malformed("no such number of threads");
+  if (count < 1 || count > std::numeric_limits<int>::max())
+    return malformed("threads is not a valid number of threads");
   model.threads = static_cast<int>(count);
   model.pace_s = pace.get<double>();
   if (!(model.pace_s >= 0) || !std::isfinite(model.pace_s)) return malformed("pace_s is not a time");
   for (int i = 0; i < isp::cost_parts; ++i) {
     const std::string name(name_of(static_cast<isp::CostPart>(i)));
     auto points = points_of(parts.value(name, Json()));
-    if (!points || points->empty()) return malformed(name + " has no times by rising size");
+    if (!points || points->empty()) return malformed(name + " has no times sorted by size");
     model.points[static_cast<std::size_t>(i)] = *std::move(points);
   }
   return model;

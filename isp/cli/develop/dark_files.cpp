@@ -60,7 +60,7 @@ std::string unchecked_text(const MosaicTiff& master) {
       "{}: a {} does not state all of camera, ISO, exposure time, temperature and orientation; those of the image are "
       "assumed",
       master.file, master.white ? "floating-point DNG" : "TIFF");
-  if (master.scaled) text += "; its values, at most 1, are taken as fractions of 65535";
+  if (master.scaled) text += "; its values are at most 1 and interpreted as fractions of 65535";
   return text;
 }
 
@@ -141,7 +141,7 @@ Result<DarkNames> dark_files(const DevelopArgs& args, const std::vector<Job>& jo
   if ((!darks->empty() && (level_given || !args.black_profile.empty())) || (!bias->empty() && level_given)) {
     return fail(
         ErrorCode::invalid_argument,
-        "dark frames already contain the black level: subtracting both leaves green shadows; give one of the two",
+        "dark frames already contain the black level, and subtracting both causes green shadows; give one of the two",
         "--black");
   }
   if (const auto apart = check_no_picture(jobs, *darks, "--dark-frame", "darks"); !apart) {
@@ -204,7 +204,7 @@ Result<std::shared_ptr<DarkSource>> read_darks(const DarkNames& names, const Dar
   calib::DarkRequest request{.noise_fraction = args.noise_fraction, .doubling_c = args.doubling_c};
   if (!args.doubling_profile.empty()) {
     if (read->groups.empty()) {
-      return fail(ErrorCode::invalid_argument, "TIFF files state no temperature to scale from: leave it out",
+      return fail(ErrorCode::invalid_argument, "has no effect on TIFF files, which state no temperature: leave it out",
                   "--dark-doubling");
     }
     const Result<double> doubling = doubling_of_profile(args.doubling_profile, read->groups.front().setting);

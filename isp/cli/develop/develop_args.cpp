@@ -22,14 +22,15 @@ namespace {
 void add_batch(CLI::App& app, const char* explained, DevelopArgs& args) {
   app.add_option("RAW", args.inputs, "raw files, folders of them, or - for standard input")->required();
   app.add_flag("--maps", args.options.denoise.maps,
-               "also write maps of residual noise variance [e-^2] and colour confidence (0 to 1) of each 2x2 cell, or "
-               "of each pixel if the raw file is not a mosaic: OUT.noise.pfm and OUT.confidence.pfm");
-  app.add_flag("--skip-existing", args.skip_existing, "leave out raw files whose outputs exist")
+               "also write OUT.noise.pfm, the residual noise variance [e-^2], and OUT.confidence.pfm, the confidence "
+               "of colours (0 to 1)");
+  app.add_flag("--skip-existing", args.skip_existing, "skip raw files whose outputs exist")
       ->excludes(app.add_flag("--force", args.force, "overwrite files that exist"));
   app.add_flag("--sync", args.sync, "wait until each file is on the disk (fsync)");
-  app.add_option("--jobs", args.jobs, "files at a time (default: one per processor, fewer if memory is short)")
+  app.add_option("--jobs", args.jobs,
+                 "number of files processed in parallel (default: one per processor, fewer if memory is short)")
       ->check(CLI::Range(1, 256));
-  add_shard(app, "take every N-th raw file from the I-th on (default 1/1: all)", args.shard);
+  add_shard(app, "process every N-th raw file, starting with the I-th (default 1/1: all files)", args.shard);
   app.add_flag("--explain", args.explain, explained);
   app.add_flag("--json", args.json, "print one JSON object for each file on stdout, as an array");
   app.add_flag("--timings", args.timings, "print the time of each stage");
@@ -40,7 +41,7 @@ void add_compression(CLI::App& app, DevelopArgs& args) {
   add_choice<isp::DngCompression>(
       app, "--compression", compression_names(),
       [&args](isp::DngCompression compression) { args.compression = compression; },
-      "compression of the DNG: none or lossless (default: none)");
+      "compression of the DNG (default: none)");
 }
 
 void add_output(CLI::App& app, DevelopArgs& args) {
@@ -65,7 +66,7 @@ Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& w
   Parsed<DevelopArgs> parsed = parse(app, words, args, left_out);
   const isp::DenoiseChoice& choice = args.options.denoise;
   if (std::holds_alternative<DevelopArgs>(parsed) && choice.maps && choice.mode == isp::DenoiseChoice::Mode::off) {
-    return refuse(app, "--maps describes the result of --denoise and cannot be combined with --denoise off");
+    return refuse(app, "--maps and --denoise off are mutually exclusive: the maps describe the denoised image");
   }
   if (std::holds_alternative<DevelopArgs>(parsed)) {
     if (const auto wrong = wrong_profiles(args)) return refuse(app, *wrong);
@@ -88,9 +89,8 @@ void add_develop(CLI::App& app, DevelopArgs& args) {
   add_choice<bool>(
       app, "--camera-profile", {{"embedded", true}, {"none", false}},
       [&args](bool embedded) { args.camera_profile = embedded; },
-      "hue, saturation and look tables and tone curve of the DNG: apply or ignore them (default: embedded; never in "
-      "linear spaces, "
-      "with --look or with colours of --profile)");
+      "apply (embedded) or ignore (none) the colour tables and the tone curve of the DNG (default: embedded; not "
+      "applied in linear spaces, with --look or with a --profile that has colours)");
   add_look(app, args.look);
   add_seeing_map(app, args.look);
   add_camera(app, args);
@@ -98,16 +98,15 @@ void add_develop(CLI::App& app, DevelopArgs& args) {
   add_darks(app, args.dark);
   add_flats(app, args.flats);
   add_budget(app, args.effects);
-  CLI::Option* const merge = app.add_flag("--merge", args.merge, "merge all raw files first: see lowlux merge");
+  CLI::Option* const merge = app.add_flag("--merge", args.merge, "merge all raw files first, as lowlux merge does");
   add_merging(app, args.merging);
   for (const char* name :
        {"--align", "--foreground", "--drizzle", "--pixfrac", "--mean", "--reference", "--false-alarm"}) {
     app.get_option(name)->needs(merge);
   }
-  add_batch(app,
-            "print the decisions for each file, their reasons and, if the speed of this machine is known (bench "
-            "--calibrate-cost), their time",
-            args);
+  add_batch(
+      app, "print the decisions for each file and their reasons, and their time if bench --calibrate-cost has been run",
+      args);
   app.get_option("--shard")->excludes(merge);
 }
 
@@ -137,7 +136,7 @@ Parsed<DevelopArgs> parse_develop_without(const std::set<std::string>& left_out,
     if (const auto wrong = complete_effects(good->look, good->effects)) return refuse(app, *wrong);
     if (const auto wrong = settle_merging(good->merging, good->effects.budgeted())) return refuse(app, *wrong);
     if (good->effects.budgeted() && good->jobs > 1) {
-      return refuse(app, "a budget requires one file at a time: leave --jobs out");
+      return refuse(app, "--jobs cannot be combined with a time budget, which requires one file at a time");
     }
   }
   return parsed;
@@ -172,7 +171,7 @@ Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {
   add_camera(app, args);
   add_denoise(app, args, NoiseLevels::at_least_draft);
   add_darks(app, args.dark);
-  add_batch(app, "what was decided for each file, and why", args);
+  add_batch(app, "print the decisions for each file and their reasons", args);
   return parse_batch(app, words, args);
 }
 
@@ -193,7 +192,7 @@ Parsed<DevelopArgs> parse_merge(const std::vector<std::string>& words) {
   add_merge_budget(app, args.effects);
   app.add_flag("--force", args.force, "overwrite the file if it exists");
   app.add_flag("--sync", args.sync, "wait until the file is on the disk (fsync)");
-  app.add_flag("--explain", args.explain, "how much of each frame was used, and why");
+  app.add_flag("--explain", args.explain, "print how much of each frame was used, and why");
   app.add_flag("--json", args.json, "print one JSON object on stdout");
   app.add_flag("--timings", args.timings, "print the time of each stage");
   app.add_flag("--quiet", args.quiet, "print no warnings and no progress");
@@ -219,20 +218,19 @@ Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
 }
 
 Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {
-  CLI::App app("Runs the published experiments and prints each finding next to the one computed here.",
+  CLI::App app("Repeats published experiments, and prints each published finding next to the result of lowlux.",
                "lowlux reproduce");
   ReproduceArgs args;
   app.add_option("ID", args.experiments, "experiments (default: all); --list names them");
   app.add_flag("--list", args.list, "list the experiments");
   app.add_option("-o,--output", args.output,
-                 "folder, created if necessary, for findings.csv, the data of the plots and report.html")
+                 "folder for findings.csv, the data of the plots and report.html; created if necessary")
       ->type_name("DIR");
-  app.add_option(
-         "--pictures-folder", args.pictures_folder,
-         "folder of the pictures of `retargeting` (default: pictures next to the command, as its build makes them)")
+  app.add_option("--pictures-folder", args.pictures_folder,
+                 "folder with the images of `retargeting` (default: the folder pictures next to the command)")
       ->type_name("DIR");
   app.add_flag("--quick", args.quick, "fewer samples: wider confidence intervals");
-  add_seed(app, "--seed", "of the random numbers (default 1)", args.seed);
+  add_seed(app, "--seed", "seed of the random numbers (default 1)", args.seed);
   app.add_flag("--json", args.json, "print JSON instead of a table");
   app.add_flag("--force", args.force, "overwrite files that exist");
   if (const auto code = parse_words(app, words)) return *code;
@@ -294,8 +292,8 @@ std::optional<std::string> set_exposure(const std::string& text, DevelopArgs& ar
 void add_rendering(CLI::App& app, DevelopArgs& args) {
   isp::DevelopOptions& o = args.options;
   add_text(app, "--exposure", "auto[+EV|-EV]|EV",
-           "gain in EV, with or without a sign; auto places the median at middle grey, limited by highlights, scene "
-           "luminance and shadow noise; auto+1 is one EV above auto (default: auto; in linear spaces 0)",
+           "gain in EV; auto: the median becomes middle grey, less if highlights, scene luminance or noise require it; "
+           "auto+1: 1 EV more (default: auto; linear spaces 0)",
            [&args](const std::string& text) { return set_exposure(text, args); });
   add_white_balance(app, o.white_balance);
   add_choice<isp::ToneCurve>(
@@ -308,25 +306,23 @@ void add_rendering(CLI::App& app, DevelopArgs& args) {
   for (const isp::DemosaicMethod method : isp::all_demosaic_methods) methods.emplace(name_of(method), method);
   CLI::Option* const demosaic = add_choice<std::optional<isp::DemosaicMethod>>(
       app, "--demosaic", methods, [&o](std::optional<isp::DemosaicMethod> method) { o.demosaic = method; },
-      "how missing colours are interpolated (default: auto)");
+      "method of interpolating the missing colours (default: auto)");
   app.add_flag("--half", o.half, "half size: exact 2x2 binning instead of demosaicing")->excludes(demosaic);
 }
 
 void add_camera(CLI::App& app, DevelopArgs& args) {
   isp::DevelopOptions& o = args.options;
-  add_text(
-      app, "--black", "auto|metadata|masked|DN[,DN,DN,DN]|PROFILE.json",
-      "black level: auto (masked pixels if present, otherwise metadata), masked, metadata, values in DN (one, or four "
-      "in CFA order), or that of a profile, whose noise and hot pixels are used too (default: auto)",
-      [&args](const std::string& text) { return set_black(text, args); });
+  add_text(app, "--black", "auto|metadata|masked|DN[,DN,DN,DN]|PROFILE.json",
+           "black level: of masked pixels, of metadata, in DN (one value, or four in CFA order), or of a profile, with "
+           "its noise and hot pixels (default: auto, masked if present, else metadata)",
+           [&args](const std::string& text) { return set_black(text, args); });
   app.add_option("--profile", args.profile,
-                 "camera profile (see calibrate): black level, noise, hot pixels, and colour matrices if it has any")
+                 "camera profile of lowlux calibrate: black level, noise, hot pixels and colour matrices")
       ->type_name("PROFILE.json");
   app.add_option("--gain-setting", args.gain_setting,
-                 "gain setting of the profile to use: its name or an ISO (default: the raw's ISO)")
+                 "gain setting of the profile, by its name or ISO (default: the ISO of the raw file)")
       ->type_name("SETTING");
-  add_text(app, "--noise", "GAIN,READ",
-           "system gain in DN per electron and read noise in electrons rms, for raw files of one ISO",
+  add_text(app, "--noise", "GAIN,READ", "system gain [DN/e-] and read noise [e- rms] of raw files of one ISO",
            [&args](const std::string& text) -> std::optional<std::string> {
              args.noise = noise_figures_of(text);
              if (args.noise) return std::nullopt;
@@ -334,20 +330,20 @@ void add_camera(CLI::App& app, DevelopArgs& args) {
            });
   add_choice<bool>(
       app, "--dark-estimate", {{"auto", true}, {"off", false}}, [&o](bool estimate) { o.estimate_dark = estimate; },
-      "dark signal that no profile and no dark frame states: estimate it from long exposures, or leave it in "
+      "estimate the dark signal from long exposures if no profile and no dark frame states it, or do not subtract it "
       "(default: auto)");
   add_choice<bool>(
       app, "--repair", {{"auto", true}, {"off", false}}, [&o](bool repair) { o.find_defects = repair; },
-      "search for hot and dead pixels, or repair only those the file lists (default: auto)");
+      "search for hot and dead pixels, or repair only those that the file lists (default: auto)");
   add_choice<bool>(
       app, "--saturation-level", {{"auto", true}, {"white", false}}, [&o](bool find) { o.find_saturation = find; },
-      "pixels are saturated at the white level (white), or below it where the frame shows that the sensor does (auto, "
-      "default)");
+      "level at which pixels are saturated: the white level, or a lower one that is measured on the frame (default: "
+      "auto)");
 }
 
 std::optional<std::string> wrong_profiles(const DevelopArgs& args) {
   if (!args.profile.empty() && !args.black_profile.empty()) {
-    return "--black and --profile both name a profile: --profile uses all values of one";
+    return "--black and --profile both name a profile: use only --profile, which includes the black level";
   }
   if (!args.gain_setting.empty() && args.profile.empty() && args.black_profile.empty()) {
     return "--gain-setting selects a setting of a profile: name the profile with --profile";
@@ -375,7 +371,7 @@ void add_denoise(CLI::App& app, DevelopArgs& args, NoiseLevels levels) {
   add_choice<bool>(
       app, "--chroma-bias", {{"least-error", false}, {"none", true}},
       [&choice](bool unbiased) { choice.unbiased_chroma = unbiased; },
-      "colour hidden by noise: fade it, for the smallest error, or keep the mean colours of squares of 32x32 px "
+      "colour that noise hides: fade it for the smallest error, or preserve the mean colours of blocks of 32x32 px "
       "(default: least-error)");
 }
 
@@ -383,7 +379,7 @@ void add_line_noise(CLI::App& app, DevelopArgs& args) {
   isp::DenoiseChoice& choice = args.options.denoise;
   add_choice<bool>(
       app, "--line-noise", {{"auto", true}, {"off", false}}, [&choice](bool lines) { choice.line_noise = lines; },
-      "correct row and column banding when detected, or never (default: auto)");
+      "correct row and column noise if it is visible, or never (default: auto)");
 }
 
 void add_darks(CLI::App& app, DarkArgs& dark) {
@@ -392,15 +388,18 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
                      "dark frames or master darks to subtract: files, a folder or a pattern; repeatable")
           ->type_name("FILE[,FILE...]|FOLDER")
           ->allow_extra_args(false);
-  app.add_option("--bias-frame", dark.bias, "bias frames: pedestal of each pixel, also to scale darks of another time")
+  app.add_option(
+         "--bias-frame", dark.bias,
+         "bias frames: the pedestal of each pixel; with --dark-frame also used to scale darks of another exposure time")
       ->type_name("FILE[,FILE...]|FOLDER")
       ->allow_extra_args(false);
-  app.add_option("--dark-frame-count", dark.count, "frames averaged in each dark frame file (default: estimated)")
+  app.add_option("--dark-frame-count", dark.count,
+                 "number of frames of which each file of --dark-frame is the mean (default: estimated)")
       ->check(CLI::Range(1, calib::max_exposures))
       ->type_name("N")
       ->needs(frames);
-  add_text(app, "--dark-noise", "SHARE",
-           "maximum increase of the shadow noise variance by dark subtraction (default: 0.1)",
+  add_text(app, "--dark-noise", "FRACTION",
+           "largest relative increase of the variance of shadows by dark subtraction (default: 0.1)",
            [&dark](const std::string& text) -> std::optional<std::string> {
              const auto share = number_of(text);
              if (!share || !(*share > 0 && *share <= 1)) return "is not a fraction above 0 and at most 1";
@@ -409,8 +408,8 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
            })
       ->needs(frames);
   add_text(app, "--dark-doubling", "C|PROFILE.json",
-           "degrees over which dark current doubles, for darks of another temperature, or a profile that states it "
-           "(default: as measured on the darks)",
+           "temperature difference that doubles the dark current, or a profile that states it, for darks of another "
+           "temperature (default: measured on the darks)",
            [&dark](const std::string& text) -> std::optional<std::string> {
              dark.doubling_c = quantity_of(text, "C");
              if (!dark.doubling_c) {
@@ -425,7 +424,7 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
 }
 
 void add_flats(CLI::App& app, std::vector<std::string>& flats) {
-  app.add_option("--flat-frame", flats, "flat frames to divide by (vignetting, PRNU): files, a folder or a pattern")
+  app.add_option("--flat-frame", flats, "flat frames, which correct vignetting and PRNU: files, a folder or a pattern")
       ->type_name("FILE[,FILE...]|FOLDER")
       ->allow_extra_args(false);
 }

@@ -120,8 +120,9 @@ std::optional<std::string> set_white_balance(const std::string& text, Choice& ch
 void add_white_balance(CLI::App& app, Choice& choice) {
   add_text(
       app, "--wb", "as-shot|auto|PRESET|KELVIN|R,G,B|PIXEL",
-      "white balance: of the camera, estimated, a preset (daylight, cloudy, shade, tungsten, fluorescent, flash), a "
-      "colour temperature and tint (5000,10), gains, or neutral at a pixel, pick:X,Y[,SIZE] (default: as-shot)",
+      "white balance: of the camera, estimated, a preset (daylight, cloudy, shade, tungsten, fluorescent, flash), "
+      "colour temperature and tint (5000,10), gains, or pick:X,Y[,SIZE], a place that becomes neutral (default: "
+      "as-shot)",
       [&choice](const std::string& text) { return set_white_balance(text, choice); }, Comma::separator);
 }
 
@@ -139,7 +140,7 @@ void add_finish(CLI::App& app, isp::DevelopOptions& options) {
   add_choice<isp::Highlights>(
       app, "--highlights", {{"clip", isp::Highlights::clip}, {"reconstruct", isp::Highlights::reconstruct}},
       [&options](isp::Highlights highlights) { options.highlights = highlights; },
-      "saturated colours: make them white, or reconstruct them from the unsaturated channels and the light around "
+      "saturated areas: make them white, or reconstruct their colour from unsaturated channels and the surroundings "
       "(default: clip)");
   add_text(app, "--local-tone", "SHARE",
            "make shadows brighter and highlights darker, 0 to 1, and preserve detail and the order of areas; noise "
@@ -163,14 +164,14 @@ void add_finish(CLI::App& app, isp::DevelopOptions& options) {
 
 void add_framing(CLI::App& app, isp::DevelopOptions& options) {
   add_text(
-      app, "--crop", "X,Y,W,H", "keep a part of the upright image: pixels, or percent of its sides (10%,10%,80%,80%)",
+      app, "--crop", "X,Y,W,H", "part of the upright image to keep, in pixels or in percent (10%,10%,80%,80%)",
       [&options](const std::string& text) -> std::optional<std::string> {
         options.crop = crop_of(text);
         if (options.crop) return std::nullopt;
         return "is not X,Y,W,H: four whole numbers of pixels or four percentages (10%,10%,80%,80%), W and H above 0";
       });
   app.add_option("--max-size", options.max_size,
-                 "longer side of the image in pixels, after --crop; larger images are shrunk, none is enlarged")
+                 "maximum of the longer side in pixels: larger images are reduced after --crop")
       ->check(CLI::Range(1, max_side_px))
       ->type_name("N");
 }

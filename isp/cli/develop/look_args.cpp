@@ -98,7 +98,7 @@ Wrong set_light(const std::string& text, LookArgs& args) {
 
 void add_light(CLI::App& app, LookArgs& args) {
   add_text(app, "--light", "NAME|FILE.csv|S/P",
-           "light of the scene, for --look eye and models: a lamp, its spectrum, or its S/P from 0.1 to 60",
+           "light of the scene, for --look eye and models: a lamp, a spectrum, or an S/P ratio from 0.1 to 60",
            [&args](const std::string& text) {
              args.given.emplace_back("--light");
              return set_light(text, args);
@@ -182,10 +182,9 @@ void add_look(CLI::App& app, LookArgs& args) {
              args.choice.noise_limit = limit;
              return std::nullopt;
            });
-  app.add_option(
-         "--coefficients", args.coefficients,
-         "coefficients of Shin's model for --look shin and --display-luminance: lines of E, alpha, beta, l, a, m, b "
-         "(default: SHIN-SUB-1, a substitute)")
+  app.add_option("--coefficients", args.coefficients,
+                 "coefficients of Shin's model for --look shin and --display-luminance: lines of E, alpha, beta, l, a, "
+                 "m, b (default: the substitute SHIN-SUB-1)")
       ->type_name("FILE");
   add_text(app, "--display-luminance", "CD_M2",
            "luminance of white of the intended display: compensates for the loss of colour perception compared with "
@@ -206,7 +205,7 @@ void add_seeing_map(CLI::App& app, LookArgs& args) {
         args.given.emplace_back("--seeing-map");
         args.choice.seeing_map = true;
       },
-      "also write the probability of seeing each 4x4 pixels with --look eye: OUT.seeing.pfm");
+      "with --look eye, also write OUT.seeing.pfm: the probability that an observer sees each 4x4 pixels");
 }
 
 std::optional<std::string> complete_look(const LookArgs& args, Planner planner, isp::LookChoice& choice) {
@@ -270,8 +269,8 @@ std::optional<std::string> complete_effects(const LookArgs& look, EffectsArgs& a
   using Which = isp::LookChoice::Which;
   if (args.budget_ms && args.budget_mpps) return "--budget-ms and --budget-mpps are mutually exclusive";
   const bool all = look.choice.which == Which::all;
-  if (all && is_given(look, "--tolerance")) return "--effects all leaves nothing out: --tolerance requires auto";
-  if (all && args.budgeted()) return "--effects all leaves nothing out: a budget requires auto";
+  if (all && is_given(look, "--tolerance")) return "--tolerance requires --effects auto";
+  if (all && args.budgeted()) return "a time budget requires --effects auto";
   args.effects.emplace().all = all;
   if (args.budgeted() && !is_given(look, "--tolerance")) {
     args.effects->tolerance_delta_e.reset();

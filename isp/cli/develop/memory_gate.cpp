@@ -110,7 +110,7 @@ int MemoryGate::files_at_a_time(int wanted) const {
 std::optional<std::string> MemoryGate::limit_text() const {
   const std::lock_guard lock(mutex_);
   if (!waited_) return std::nullopt;
-  return fmt::format("{} at a time, limited by memory: about {:.0f} MB for each, {:.0f} MB for all", capacity(),
+  return fmt::format("{} files in parallel, limited by memory: about {:.0f} MB for each, {:.0f} MB for all", capacity(),
                      1e-6 * file_bytes_, 1e-6 * limit_bytes_);
 }
 

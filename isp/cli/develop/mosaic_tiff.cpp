@@ -19,7 +19,7 @@ namespace {
 constexpr float max_code = 65535;
 
 tl::unexpected<Error> coloured() {
-  return fail(ErrorCode::unsupported, "this TIFF has colours; save the mosaic of the sensor, not demosaiced");
+  return fail(ErrorCode::unsupported, "this TIFF has colours; save the mosaic of the sensor before demosaicing");
 }
 
 Result<Plane<float>> grey_of(const Encoded8& /*picture*/) {
@@ -70,7 +70,7 @@ bool is_tiff_name(const std::string& file) {
 
 Result<MosaicTiff> mosaic_of(RawFrame frame, const std::string& file) {
   if (frame.raw.layout == SensorLayout::linear_rgb) {
-    return fail(ErrorCode::unsupported, "this DNG has colours; save the mosaic of the sensor, not demosaiced");
+    return fail(ErrorCode::unsupported, "this DNG has colours; save the mosaic of the sensor before demosaicing");
   }
   return MosaicTiff{.file = file,
                     .dn = std::move(frame.raw.dn_float),

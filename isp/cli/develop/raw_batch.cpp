@@ -187,7 +187,7 @@ Result<ReadyFrame> ready_frame(const RawBatch& batch, const Job& job, Executor& 
   if (!origin) return tl::make_unexpected(origin.error());
   ready->noise = *std::move(origin);
   const auto& noise = ready->frame.noise;
-  if (noise && noise->source == NoiseProfile::Source::picture) clock.lap("noise of the picture");
+  if (noise && noise->source == NoiseProfile::Source::picture) clock.lap("noise of the image");
   if (const auto set = set_cost(batch, ready->options, executor, clock); !set) return tl::make_unexpected(set.error());
   return ready;
 }
@@ -272,7 +272,7 @@ class BatchRun {
       const Result<void> worked = work_(own, executor, progress, out);
       if (!worked) out.error = with_file(worked.error(), job.input);
     } catch (const std::bad_alloc&) {
-      out.error = Error{ErrorCode::too_large, "not enough memory; --jobs 1 needs the least", job.input};
+      out.error = Error{ErrorCode::too_large, "not enough memory; --jobs 1 needs least memory", job.input};
     } catch (const std::exception& failure) {
       out.error = Error{ErrorCode::too_large, failure.what(), job.input};
     }

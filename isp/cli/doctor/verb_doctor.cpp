@@ -160,7 +160,7 @@ InstalledPart find_connected_cameras() {
     for (const capture::CameraListing& camera : *cameras) names.push_back(fmt::format("{} {}", camera.id, camera.name));
   }
   if (!names.empty()) return {.name = "cameras", .found = fmt::format("{}", fmt::join(names, "; "))};
-  return {.name = "cameras", .state = State::missing, .remedy = "no camera is connected; files need none"};
+  return {.name = "cameras", .state = State::missing, .remedy = "no camera is connected; none is needed for files"};
 }
 
 std::ptrdiff_t count_profiles(const fs::path& folder) {

@@ -39,10 +39,8 @@ Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words) {
       "exists, use `develop` or `denoise` instead: they subtract the dark charge.",
       "lowlux resaturate");
   ResaturateArgs args;
-  app.add_option("IMAGE", args.input, "picture (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
-  app.add_option("-o,--output", args.output, "picture to write (.png .jpg .tif .exr .pfm)")
-      ->required()
-      ->type_name("OUT");
+  app.add_option("IMAGE", args.input, "image (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
+  app.add_option("-o,--output", args.output, "image to write (.png .jpg .tif .exr .pfm)")->required()->type_name("OUT");
   add_text(app, "--black", "R,G,B", "black point: sRGB codes, 0 to 255, of areas without light",
            [&args](const std::string& text) { return set_codes(text, args); });
   add_text(app, "--black-area", "X,Y,WIDTH,HEIGHT", "black point: the mean of this area of the image, in pixels",
@@ -70,7 +68,7 @@ Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words) {
   app.add_flag("--quiet", args.quiet, "print no warnings and no text");
   if (const auto code = parse_words(app, words, &args.defaults)) return *code;
   if (args.black_codes.has_value() == args.black_area.has_value()) {
-    return refuse(app, "give the black point once: --black R,G,B, or --black-area of an area without light");
+    return refuse(app, "give either --black R,G,B or --black-area, an area without light");
   }
   return args;
 }

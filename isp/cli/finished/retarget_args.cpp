@@ -16,10 +16,10 @@ void add_model(CLI::App& app, RetargetArgs& args) {
   for (const auto& [method, name] : isp::retarget_methods) methods.emplace(name, method);
   add_choice(
       app, "--model", methods, [&args](isp::RetargetMethod method) { args.options.method = method; },
-      "method (default constrained, which is best by Shin's model)");
+      "method (default: constrained)");
   app.add_option(
          "--coefficients", args.coefficients,
-         "coefficients of Shin's model: lines of E, alpha, beta, l, a, m, b (default: SHIN-SUB-1, a substitute)")
+         "coefficients of Shin's model: lines of E, alpha, beta, l, a, m, b (default: the substitute SHIN-SUB-1)")
       ->type_name("FILE");
   const Names<isp::ShinUnits> units{{"lux", isp::ShinUnits::lux}, {"luminance", isp::ShinUnits::luminance_as_is}};
   add_choice(
@@ -31,14 +31,11 @@ void add_model(CLI::App& app, RetargetArgs& args) {
 
 Parsed<RetargetArgs> parse_retarget(const std::vector<std::string>& words) {
   CLI::App app(
-      "Adapts an image to a dim display, so that it looks as it does on a bright one: colour is increased, because the "
-      "eye sees less colour in dim light.",
+      "Adapts an image to a dim display: increases colour, because the eye perceives less colour in dim light.",
       "lowlux retarget");
   RetargetArgs args;
-  app.add_option("IMAGE", args.input, "picture (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
-  app.add_option("-o,--output", args.output, "picture to write (.png .jpg .tif .exr .pfm)")
-      ->required()
-      ->type_name("OUT");
+  app.add_option("IMAGE", args.input, "image (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
+  app.add_option("-o,--output", args.output, "image to write (.png .jpg .tif .exr .pfm)")->required()->type_name("OUT");
   add_luminance(app, "--source-luminance", "luminance of white for which the image was made (default 250)",
                 args.options.source_cd_m2);
   add_luminance(app, "--display-luminance", "luminance of the display's white (default 2)", args.options.display_cd_m2);

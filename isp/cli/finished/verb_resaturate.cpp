@@ -51,7 +51,7 @@ Result<isp::Xyz> black_of_area(const SceneLinear& xyz, const Rect& area) {
 void add_warnings(ResaturateOutcome& out) {
   if (out.made.fraction_dark > 0.5) {
     out.warnings.push_back(fmt::format(
-        "{:.0f} % of the image is no brighter than the black point and becomes grey: is the black point too bright?",
+        "{:.0f} % of the image is not brighter than the black point and becomes grey: is the black point too bright?",
         100 * out.made.fraction_dark));
   }
   if (out.made.fraction_saturated > 0.5) {
@@ -98,8 +98,8 @@ void print(const ResaturateArgs& args, const ResaturateOutcome& done) {
                                       {"output", args.output},
                                       {"black_xyz", {b.x, b.y, b.z}},
                                       {"chroma_noise", done.made.chroma_noise},
-                                      {"share_dark", done.made.fraction_dark},
-                                      {"share_saturated", done.made.fraction_saturated},
+                                      {"dark_fraction", done.made.fraction_dark},
+                                      {"saturated_fraction", done.made.fraction_saturated},
                                       {"warnings", done.warnings}};
     print_out(fmt::format("{}\n", json_text(json, 2)));
   } else if (!args.quiet) {

@@ -30,7 +30,7 @@ void add_camera(CLI::App& app, AdviseArgs& args) {
   app.add_option("--sensor", args.sensor, "sensor by name (`lowlux simulate --list`), or file of a camera profile")
       ->type_name("NAME|PROFILE.json")
       ->group(group);
-  app.add_option("--gain", args.gain, "only this gain setting (default: the best of all)")
+  app.add_option("--gain", args.gain, "gain setting to use (default: the best one)")
       ->type_name("SETTING")
       ->group(group);
   app.add_option("--camera", args.figures.camera,
@@ -67,8 +67,8 @@ void add_scene(CLI::App& app, AdviseArgs& args) {
   add_optional(app, "--luminance", "CD_M2",
                "luminance of the mid tone (default: the median of the file's green pixels)", args.midtone_cd_m2);
   add_text(app, "--highlight", "CD_M2|RATIOx",
-           "luminance that must not clip, in cd/m2 or as a multiple of the mid tone's (default: the one that the "
-           "fraction --clip of the file's green pixels exceeds)",
+           "luminance that must not clip, in cd/m2 or as a multiple of the mid tone, 20x (default: exceeded by the "
+           "fraction --clip of the file's green pixels)",
            [&args](const std::string& text) { return set_highlight(text, args); })
       ->group(group);
   app.add_option("--illuminant", args.light, "light of the scene, by name (default D65)")
@@ -79,11 +79,10 @@ void add_scene(CLI::App& app, AdviseArgs& args) {
 }  // namespace
 
 void add_advise(CLI::App& app, AdviseArgs& args) {
-  CLI::Option* wanted =
-      app.add_flag("--advise", args.wanted,
-                   "with --sensor: exposure and gain for the best signal-to-noise ratio and chromaticity of the mid "
-                   "tone; without: how many frames of which exposures to take for `lowlux merge`")
-          ->group(group);
+  CLI::Option* wanted = app.add_flag("--advise", args.wanted,
+                                     "with --sensor: print the best exposure time and gain; without: print the number "
+                                     "and the exposures of frames for lowlux merge")
+                            ->group(group);
   add_camera(app, args);
   add_figures(app, args);
   add_scene(app, args);
@@ -95,13 +94,12 @@ void add_advise(CLI::App& app, AdviseArgs& args) {
              [&args](double share) { args.clipped_share = share; })
       ->group(group);
   add_optional(app, "--snr", "DB",
-               "signal-to-noise ratio to reach in the darkest tenth when merged (default 20); without --sensor",
-               args.snr_db);
+               "without --sensor: signal-to-noise ratio of the darkest tenth after merging (default 20)", args.snr_db);
   add_number(app, "--patch", "PIXELS",
-             "number of red pixels of the patch whose chromaticity is evaluated (default 256)",
+             "number of red pixels in the patch whose chromaticity is predicted (default 256)",
              [&args](double pixels) { args.patch_pixels = pixels; })
       ->group(group);
-  app.add_option("--frames", args.frames, "number of frames that are averaged (default 1)")
+  app.add_option("--frames", args.frames, "number of frames to be averaged (default 1)")
       ->check(CLI::Range(1, 1000000))
       ->type_name("N")
       ->group(group);
@@ -145,12 +143,12 @@ std::string validate_advise(const CLI::App& app, const AdviseArgs& args, std::si
   if (files == 0 && !args.highlight_cd_m2 && !args.highlight_ratio) {
     return "--advise without a raw file needs --highlight, as a luminance or as 20x";
   }
-  if (args.snr_db) return "--snr applies to the frames of a merge: leave --sensor out";
+  if (args.snr_db) return "--snr and --sensor are mutually exclusive: --snr applies to frames for a merge";
   if (!args.report.empty() && !args.report.ends_with(".html")) {
     return "--report writes a page, whose name must end with .html, found " + args.report;
   }
   if (!args.longest_exposure_s && !args.speed_px_per_s) {
-    return "--advise needs a longest exposure: --max-exposure, or --motion with --blur";
+    return "--advise needs a limit on the exposure time: --max-exposure, or --motion with --blur";
   }
   return {};
 }

@@ -58,17 +58,17 @@ std::string headline(const BracketCase& found) {
 std::string reason(const BracketCase& found) {
   const isp::BracketAdvice& a = found.advice;
   const std::string levels = fmt::format(
-      "the brightest lamps saturate after {}, a single frame reaches {:.3g} dB in the darkest tenth after {}",
+      "the brightest lamps saturate at {}; a single frame reaches {:.3g} dB in the darkest tenth at {}",
       exposure_text(a.highlight_exposure_s), isp::decibel(found.request.snr), exposure_text(a.shadow_exposure_s));
-  if (a.is_bracket()) return "one exposure does not suffice for both: " + levels;
+  if (a.is_bracket()) return "one exposure time is not sufficient for both: " + levels;
   if (a.shadow_exposure_s <= std::min(a.highlight_exposure_s, found.request.longest_exposure_s)) {
-    return "one exposure suffices for both: " + levels;
+    return "one exposure time is sufficient for both: " + levels;
   }
   if (found.request.longest_exposure_s < a.highlight_exposure_s) {
     return fmt::format("exposures are at most {}, before highlights saturate: {}",
                        exposure_text(found.request.longest_exposure_s), levels);
   }
-  return "a bracket would not take fewer frames: " + levels;
+  return "a bracket does not need fewer frames: " + levels;
 }
 
 std::string exposures_text(const isp::BracketAdvice& advice, const FrameInfo& info) {
@@ -137,10 +137,11 @@ std::string bracket_text(const BracketCase& found, const FrameInfo& info) {
   out.add("scene", scene_text(found.request.scene));
   out.add("this raw", raw_text(found));
   if (found.request.scene.darkest_is_black) {
-    out.add("note", "the darkest tenth is not above black: the advice is for the darkest level that this raw shows");
+    out.add("note",
+            "the darkest tenth is not above black: the advice applies to the darkest level that this raw file shows");
   }
   if (found.request.scene.highlight_fraction > 1) {
-    out.add("note", "take the shortest exposure first: `lowlux info --advise` on it measures the lamps");
+    out.add("note", "take the shortest exposure first, and measure the lamps on it with `lowlux info --advise`");
   }
   if (count_of(found.advice) > 1) out.add("merge", command_of(found.advice));
   if (found.advice.is_bracket()) out.add("", "longest exposure first: the first frame is the reference");

@@ -41,8 +41,8 @@ void add_note(std::vector<std::string>& notes, std::string note) {
 void note_unknown(const isp::GainSetting& gain, std::vector<std::string>& notes) {
   const double noise_e = std::hypot(gain.sensor.row_noise_e, gain.sensor.column_noise_e);
   if (noise_e > 0) {
-    add_note(notes,
-             fmt::format("row and column noise of {:.2g} e- at {} are not in the prediction", noise_e, gain.name));
+    add_note(notes, fmt::format("the prediction does not include row and column noise of {:.2g} e- at {}", noise_e,
+                                gain.name));
   }
 }
 
@@ -173,7 +173,7 @@ Result<ProfileColour> profile_colour(const AdviseArgs& args, const CameraProfile
 
 Result<void> take_profile(const AdviseArgs& args, const Spectrum& light, const isp::Optics& optics, AdviceCase& out) {
   if (has_figures(args.figures)) {
-    return fail(ErrorCode::invalid_argument, "these values are those of the profile; change them there", args.sensor);
+    return fail(ErrorCode::invalid_argument, "these values come from the profile; change them there", args.sensor);
   }
   const auto profile = read_profile(args.sensor);
   if (!profile) return tl::make_unexpected(profile.error());
@@ -203,8 +203,8 @@ Result<void> take_profile(const AdviseArgs& args, const Spectrum& light, const i
   }
   if (out.request.gains.empty()) {
     return fail(ErrorCode::insufficient,
-                "no requested gain setting of the profile has sensor figures and an ISO speed; measure its photon "
-                "transfer, or give --white-luminance",
+                "no requested gain setting of the profile has sensor figures and an ISO speed; add them with "
+                "`calibrate noise`, or give --white-luminance",
                 args.sensor);
   }
   return {};

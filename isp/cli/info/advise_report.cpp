@@ -97,7 +97,8 @@ std::string scene_of(const isp::AdviceRequest& r) {
       r.patch_pixels);
 }
 
-constexpr const char* heavy_note = "* a bound only: at so little signal the chromaticity scatters with heavy tails";
+constexpr const char* heavy_note =
+    "* only a lower bound: at this low signal the distribution of the chromaticity has heavy tails";
 
 Json point_json(const isp::AdvicePoint& p) {
   Json json{{"exposure_s", p.exposure_s},
@@ -105,8 +106,8 @@ Json point_json(const isp::AdvicePoint& p) {
             {"snr_db", nullptr},
             {"uv_std", nullptr},
             {"weight_snr", nullptr},
-            {"highlight_share_of_full_well", p.highlight_charge_fraction},
-            {"highlight_share_of_range", p.highlight_code_fraction}};
+            {"highlight_fraction_of_full_well", p.highlight_charge_fraction},
+            {"highlight_fraction_of_range", p.highlight_code_fraction}};
   if (p.midtone) {
     json["snr"] = p.midtone->snr;
     json["snr_db"] = isp::decibel(p.midtone->snr);
@@ -146,8 +147,8 @@ isp::Plot plot_of(const AdviceCase& asked, const isp::ExposureAdvice& advice, bo
   }
   const isp::AdvicePoint& best = advice.gains[advice.best].at;
   plot.series.push_back({"advised", {best.exposure_s}, {value(best)}, isp::Mark::points});
-  plot.caption =
-      chromaticity ? "Lower bound for unbiased estimators (Cramer-Rao)." : "Of the channel with most signal.";
+  plot.caption = chromaticity ? "Lower bound for unbiased estimators (Cramer-Rao)."
+                              : "Signal-to-noise ratio of the channel with the largest signal.";
   return plot;
 }
 
@@ -161,11 +162,11 @@ std::string advice_text(const AdviceCase& asked, const isp::ExposureAdvice& advi
   fmt::format_to(out, "  sensor          {}\n", asked.camera);
   fmt::format_to(out, "  scene           {}\n", scene_of(asked.request));
   for (const std::string& note : asked.notes) fmt::format_to(out, "  note            {}\n", note);
-  fmt::format_to(out, "the best of each gain\n{}", aligned_text(gains_table(asked, advice), 7));
+  fmt::format_to(out, "the best exposure of each gain setting\n{}", aligned_text(gains_table(asked, advice), 7));
   if (std::ranges::any_of(advice.gains, has_heavy_tails, &isp::GainAdvice::at)) {
     fmt::format_to(out, "{}\n", heavy_note);
   }
-  fmt::format_to(out, "the curves over exposure time are in the page of --report and in --json\n");
+  fmt::format_to(out, "--report and --json contain the curves over exposure time\n");
   return text;
 }
 
@@ -177,7 +178,7 @@ std::string advice_json(const AdviceCase& asked, const isp::ExposureAdvice& advi
     json.update(point_json(gain.at));
     json["limit"] = limit_name(gain.limit);
     json["largest_noise"] = source_name(gain.largest_noise);
-    json["largest_noise_share"] = gain.largest_noise_fraction;
+    json["max_noise_fraction"] = gain.largest_noise_fraction;
     gains.push_back(std::move(json));
   }
   for (const isp::AdvicePoint& point : advice.curve) {
@@ -210,7 +211,7 @@ isp::Report advice_page(const AdviceCase& asked, const isp::ExposureAdvice& advi
                                  asked.camera, scene_of(asked.request), version_number()),
                      {}};
   const std::string tails = std::ranges::any_of(advice.curve, has_heavy_tails) ? heavy_note : "";
-  report.sections.push_back({"The best of each gain",
+  report.sections.push_back({"The best exposure of each gain setting",
                              notes,
                              gains_table(asked, advice),
                              {plot_of(asked, advice, false), plot_of(asked, advice, true)}});

@@ -48,11 +48,11 @@ void add_merging(CLI::App& app, MergeArgs& args) {
              [&args](double side) { args.pixfrac = side; });
   add_choice<bool>(
       app, "--mean", {{"robust", true}, {"plain", false}}, [&options](bool robust) { options.robust = robust; },
-      "leave out content that does not match (default; a budget may decide), or average everything");
-  app.add_option(
-         "--reference", args.reference,
-         "raw file to which the others are aligned (default: the first; the middle one if aligned by stars; the "
-         "longest exposure of a bracket that is not saturated in more than half of its pixels)")
+      "average only content that matches the other frames (robust), or everything (default: robust; with --budget-ms "
+      "what fits)");
+  app.add_option("--reference", args.reference,
+                 "raw file to which the others are aligned (default: the first; with --align stars the middle one; in "
+                 "a bracket the longest exposure that is at most half saturated)")
       ->type_name("RAW");
   add_within(app, "--false-alarm", "RATE", "fraction of a static scene that is left out by chance (default 0.001)",
              1e-6, 0.5, [&options](double rate) { options.false_alarm = rate; });
@@ -67,9 +67,10 @@ std::optional<std::string> settle_merging(MergeArgs& args, bool budgeted) {
     return "--budget-ms does not know the times of --align stars and --drizzle: leave it out";
   if (args.pixfrac && !args.drizzle_scale) return "--pixfrac needs --drizzle";
   if (!args.drizzle_scale) return std::nullopt;
-  if (alignment == isp::MergeAlignment::none) return "--drizzle needs displaced frames, and --align none aligns none";
+  if (alignment == isp::MergeAlignment::none)
+    return "--drizzle needs displaced frames, and --align none assumes a camera at rest";
   if (args.options.keep_foreground) {
-    return "--drizzle measures colours at displaced positions, and --foreground keep displaces nothing: choose one";
+    return "--drizzle and --foreground keep are mutually exclusive";
   }
   args.options.drizzle = merge::DrizzleOptions{.scale = *args.drizzle_scale, .pixfrac = args.pixfrac.value_or(1)};
   return std::nullopt;

@@ -40,7 +40,8 @@ Result<std::vector<std::string>> files_to_merge(const DevelopArgs& args) {
   std::vector<std::string> files;
   for (const std::string& input : args.inputs) {
     if (is_standard_stream(input)) {
-      return fail(ErrorCode::invalid_argument, "frames to merge are read more than once: name their files", "-");
+      return fail(ErrorCode::invalid_argument,
+                  "frames to merge are read more than once and cannot come from standard input: name their files", "-");
     }
     Result<std::vector<std::string>> named = raw_files_of(input, args.quiet);
     if (!named) return named;

@@ -30,9 +30,10 @@ std::string reason_of(const isp::FrameUse& use, bool by_stars) {
   if (!use.aligned) return by_stars ? "its stars do not match" : "its displacement could not be found";
   if (use.used_fraction > 0.99) return "it matches the reference";
   const bool is_compared = use.mean_chi_square > 0 || use.outliers > 0;
-  if (use.used_fraction == 0 && !is_compared) return "no part of it can be compared, as where one frame is saturated";
+  if (use.used_fraction == 0 && !is_compared)
+    return "no part of it can be compared, for example because one frame is saturated";
   if (use.mean_chi_square > 2 || use.used_fraction < little_used)
-    return "it differs from the reference by more than noise";
+    return "it differs from the reference by more than the noise";
   return "parts of its content moved";
 }
 
@@ -42,7 +43,7 @@ std::string method_name(const isp::MergeMethod& method) {
 
 /// Returns why no better method was chosen.
 std::string reason_of(const isp::MergePlan& plan) {
-  if (!plan.fits) return "no method fits, and this is the cheapest";
+  if (!plan.fits) return "no method fits into the time; this one is the fastest";
   if (plan.better) return fmt::format("{} would take {:.0f} ms", method_name(*plan.better), 1e3 * plan.better_s);
   return "no better method can be chosen";
 }
@@ -77,8 +78,8 @@ std::optional<std::string> little_used_warning(const std::vector<std::string>& i
   }
   if (count == 0) return std::nullopt;
   return fmt::format(
-      "{} of {} frames match{} the reference in less than {:.0f} % of the image ({}); leave such frames "
-      "out, --explain lists each",
+      "{} of {} frames match{} the reference in less than {:.0f} % of the image ({}); leave these frames out; "
+      "--explain lists them",
       count, inputs.size(), count == 1 ? "es" : "", 100 * little_used, first);
 }
 

@@ -170,7 +170,7 @@ std::string assumed_text(const NoiseOrigin& origin, bool is_denoised) {
   }
   const std::string found =
       fmt::format("the image has {:.2g} times the noise variance expected ({})", origin.prior_ratio, origin.basis);
-  if (!is_denoised) return found + ": noise reduction uses the measured noise; --noise GAIN,READ states another";
+  if (!is_denoised) return found + ": noise reduction uses the measured noise; --noise GAIN,READ overrides it";
   return found +
          ", because it was denoised before: noise is not reduced again; --denoise standard reduces the residual noise, "
          "--noise GAIN,READ states its size";
@@ -206,7 +206,7 @@ Result<OptionalOrigin> use_given(const calib::NoiseFigures& given, const BlackPo
   frame.noise =
       profile_of(given.gain_dn_per_e, offset_dn2_of(given, frame.raw), frame.raw, black, NoiseProfile::Source::profile);
   if (!isp::electrons_at_white(frame.raw, *frame.noise)) {
-    return fail(ErrorCode::invalid_argument, fmt::format("--noise: {:g} DN/e- is not possible for a range of {:g} DN",
+    return fail(ErrorCode::invalid_argument, fmt::format("--noise: {:g} DN/e- is not plausible for a range of {:g} DN",
                                                          given.gain_dn_per_e, isp::mean_range_dn(frame.raw, black)));
   }
   return NoiseOrigin{.source = NoiseOrigin::Source::given, .figures = given};
@@ -286,7 +286,8 @@ Result<OptionalOrigin> find_noise(const isp::DevelopOptions& options, const std:
   }
   const bool has_class = !frame.raw.is_float() && frame.raw.layout != SensorLayout::linear_rgb;
   if (has_class) return assume_noise(*black, noise.error().message, frame, executor);
-  const std::string why = "the noise is not stated and cannot be measured on the image: " + noise.error().message;
+  const std::string why =
+      "the noise is not stated by the file and cannot be measured on the image: " + noise.error().message;
   if (options.denoise.mode == Mode::level || options.denoise.always) {
     return fail(noise.error().code, why + "; state it with --noise GAIN,READ");
   }

@@ -45,7 +45,8 @@ void add_time(Lines& out, const isp::StepPlan& effects, const isp::ProcessingGoa
     text += fmt::format(", roughly ({:.2f} times that of {}); `lowlux bench --calibrate-cost` measures this machine",
                         choice.cost->pace, isp::reference_machine);
   } else if (choice.cost->pace_s > 0) {
-    text += fmt::format(" ({:.2f} times as slow as when its speed was measured)", choice.cost->pace);
+    text +=
+        fmt::format(" (the machine now takes {:.2f} times as long as when its speed was measured)", choice.cost->pace);
   }
   out.add("budget", text);
 }
@@ -54,7 +55,7 @@ void add_effects(Lines& out, const isp::StepPlan& effects, const isp::Processing
   out.add("effects", choice.all ? std::string("all")
                      : choice.tolerance_delta_e
                          ? fmt::format("auto, tolerance {:.2g} CIEDE2000", *choice.tolerance_delta_e)
-                         : std::string("auto, as accurate as the time allows"));
+                         : std::string("auto, the most accurate plan within the time"));
   for (const isp::PlannedStep& effect : effects.effects) {
     std::string text = fmt::format("{}: {}", effect.name, effect.used ? "applied" : "skipped");
     text += std::isfinite(effect.size)
@@ -75,7 +76,7 @@ std::string look_name(const isp::DevelopPlan& plan) {
 void add_look_effects(Lines& out, std::span<const isp::LookEffect> effects) {
   for (const isp::LookEffect& effect : effects) {
     const std::string size = std::isfinite(effect.size) ? fmt::format("up to {:.2g} CIEDE2000", effect.size)
-                                                        : std::string("a matter of preference, on request only");
+                                                        : std::string("applied on request only");
     out.add("", fmt::format("{} {}: {}", effect.name, effect.used ? "applied" : "skipped", size));
   }
 }

@@ -71,7 +71,7 @@ Result<void*> load_module(const Module& module) {
     }
     if (void* found = function_of(loaded, module); found != nullptr) return found;
     dlclose(loaded);
-    said += fmt::format("{}{} is of another build of lowlux: build or install it again", said.empty() ? "" : "; ",
+    said += fmt::format("{}{} belongs to another build of lowlux: build or install it again", said.empty() ? "" : "; ",
                         place.string());
   }
   std::replace(said.begin(), said.end(), '\n', ' ');

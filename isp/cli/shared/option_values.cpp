@@ -71,7 +71,7 @@ std::optional<std::string> unknown_option(const CLI::App& app) {
   if (found == unknown.end() || *found == "--") return std::nullopt;
   std::error_code ignored;
   if (std::filesystem::exists(*found, ignored)) {
-    return fmt::format("'{0}' is read as an option; for the file of that name write ./{0}", *found);
+    return fmt::format("'{0}' is interpreted as an option; to name a file, write ./{0}", *found);
   }
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options()) {

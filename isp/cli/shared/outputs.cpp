@@ -170,7 +170,7 @@ Result<PictureKind> picture_kind(FileFormat format, std::optional<int> bits, std
   kind.space = space.value_or(linear ? OutputSpace::linear_srgb : OutputSpace::srgb);
   const int depth = bits.value_or(default_bits(format, kind.space));
   if (format == FileFormat::exr && depth == 8)
-    return fail(ErrorCode::invalid_argument, "OpenEXR holds 16 or 32 bits", "--bits");
+    return fail(ErrorCode::invalid_argument, "OpenEXR has 16 or 32 bits", "--bits");
   kind.samples = sample_type_of(format, depth);
   if (const auto fits = isp::check_writable(format, kind.samples, kind.space); !fits) {
     const bool space_is_wrong = isp::supported(format, kind.samples) && space;
@@ -188,7 +188,7 @@ Result<isp::DevelopOptions> complete_options(const DevelopArgs& args, FileFormat
   o.tone = args.tone.value_or(is_linear(o.space) ? isp::ToneCurve::none : isp::ToneCurve::standard);
   if (!args.exposure_given && is_linear(o.space)) o.exposure_ev = 0;
   if (args.look.display_cd_m2 && (o.space != OutputSpace::srgb || o.samples == SampleType::f32)) {
-    return fail(ErrorCode::invalid_argument, "makes sRGB pictures of 8 or 16 bits", "--display-luminance");
+    return fail(ErrorCode::invalid_argument, "makes sRGB images of 8 or 16 bits", "--display-luminance");
   }
   if (const auto fits = isp::check_options(o); !fits) return tl::make_unexpected(fits.error());
   return o;

@@ -64,8 +64,9 @@ Result<std::vector<std::string>> files_in_folder(const std::string& folder, bool
   if (found.empty()) {
     return fail(ErrorCode::not_found,
                 left_out == sub_folders.end()
-                    ? "the folder holds no raw files"
-                    : fmt::format("the folder holds no raw files, its sub-folder {} does: name that one", *left_out),
+                    ? "the folder contains no raw files"
+                    : fmt::format("the folder contains no raw files, but its sub-folder {} does: name the sub-folder",
+                                  *left_out),
                 folder);
   }
   if (left_out != sub_folders.end() && !quiet) {

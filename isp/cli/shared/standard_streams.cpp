@@ -23,7 +23,7 @@ std::optional<std::string> wrong_streams(const DevelopArgs& args) {
   if (streams > 1) return "-: standard input is given twice";
   if (!is_standard_stream(args.output)) return std::nullopt;
   if (args.json || args.explain || args.timings) {
-    return "-o -: standard output holds the file: leave out --json, --explain and --timings";
+    return "-o -: standard output is the file: leave out --json, --explain and --timings";
   }
   if (args.options.denoise.maps || args.options.look.seeing_map) {
     return "-o -: maps need the name of a file";

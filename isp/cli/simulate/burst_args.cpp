@@ -83,7 +83,7 @@ std::string without_effect(const BurstArgs& args, const std::string& scene) {
   if (o.horizon_px && !o.sky_moves()) return "--horizon has no effect without --field-rotation or --drift";
   if (o.movers == 0 && o.mover_size_px) return "--mover-size has no effect without --movers";
   if (o.movers == 0 && args.mover_speed_given) return "--mover-speed has no effect without --movers";
-  if (o.movers != 0 && scene == "dark") return "--movers: objects show parts of the scene, and it is dark";
+  if (o.movers != 0 && scene == "dark") return "--movers has no effect on the scene dark";
   return {};
 }
 
@@ -101,10 +101,12 @@ const char* motion_option(const capture::BurstOptions& o) {
 void add_burst(CLI::App& app, BurstArgs& args) {
   add_motion(app, args.options);
   add_objects(app, args);
-  add_text(app, "--bracket", "EV[,EV...]", "exposure times of the frames in turn: --exposure times 2^EV",
+  add_text(app, "--bracket", "EV[,EV...]",
+           "exposure times of the frames, repeated in this order: --exposure times 2^EV",
            [&args](const std::string& text) { return set_bracket(text, args.options.bracket_ev); })
       ->group(group);
-  app.add_option("--reduce", args.reduction, "samples of the scene per pixel and axis, 1 to 8 (default 2 in motion)")
+  app.add_option("--reduce", args.reduction,
+                 "samples of the scene per pixel along each axis, 1 to 8 (default 2 if frames move)")
       ->type_name("N")
       ->group(group);
 }

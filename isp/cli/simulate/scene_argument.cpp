@@ -77,7 +77,7 @@ Result<capture::Scene> chart_of(const SceneArgs& args, const capture::SceneSetup
   if (found == charts.end()) {
     return fail(
         ErrorCode::invalid_argument,
-        fmt::format("unknown chart '{}': the charts are {}, and tables (chart:FILE.csv)", which, joined(charts)),
+        fmt::format("unknown chart '{}': the charts are {}, or a table (chart:FILE.csv)", which, joined(charts)),
         "SCENE");
   }
   return capture::chart_scene(setup, isp::spectra_of(found->second));
@@ -95,8 +95,8 @@ Result<SceneOfArgs> picture_of(const SceneArgs& args, Executor& executor) {
     }
     return tl::make_unexpected(std::move(error));
   }
-  if (args.size_given) return fail(ErrorCode::invalid_argument, "a picture has its own size", "--size");
-  if (args.light_given) return fail(ErrorCode::invalid_argument, "a picture has its own light", "--light");
+  if (args.size_given) return fail(ErrorCode::invalid_argument, "an image has its own size", "--size");
+  if (args.light_given) return fail(ErrorCode::invalid_argument, "an image has its own light", "--light");
   const double luminance =
       picture->absolute && !args.luminance_given ? picture->white_luminance_cd_m2 : args.luminance_cd_m2;
   auto scene = capture::picture_scene(std::move(picture->xyz), luminance);
@@ -129,7 +129,7 @@ Result<Spectrum> light_of(const std::string& name, const std::string& option) {
     }
     const auto power = table->front().spectrum.values();
     if (*std::min_element(power.begin(), power.end()) < 0) {
-      return fail(ErrorCode::malformed, "a light has no negative power", name);
+      return fail(ErrorCode::malformed, "the power of a light must not be negative", name);
     }
     return finely_sampled(table->front().spectrum);
   }

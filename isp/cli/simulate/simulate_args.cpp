@@ -100,12 +100,11 @@ Wrong set_tolerance(const std::string& text, isp::Tolerance& tolerance) {
 }
 
 void add_scene(CLI::App& app, SceneArgs& s) {
-  app.add_option(
-         "SCENE", s.what,
-         "a picture (PNG, JPEG, TIFF, OpenEXR, PFM, PPM), or dark, flat, chart, chart:macbeth, chart:munsell, or "
-         "chart:FILE.csv with reflectances by wavelength")
+  app.add_option("SCENE", s.what,
+                 "an image (PNG, JPEG, TIFF, OpenEXR, PFM, PPM), or dark, flat, chart, chart:macbeth, chart:munsell, "
+                 "or chart:FILE.csv with reflectances by wavelength")
       ->type_name("");
-  add_text(app, "--size", "WxH", "size of a scene that is not a picture (default 1200x800)",
+  add_text(app, "--size", "WxH", "size of a scene that is not an image (default 1200x800)",
            [&s](const std::string& text) { return set_size(text, s); });
   add_text(app, "--light", "NAME|FILE.csv",
            "light of charts and flats: a CIE illuminant or a lamp (--list), or a table file (default D65)",
@@ -115,15 +114,15 @@ void add_scene(CLI::App& app, SceneArgs& s) {
              return std::nullopt;
            });
   add_number(app, "--luminance", "CD_M2",
-             "luminance of a white diffuser in the scene, or of white in a picture (default 1, or the value that the "
-             "picture states)",
+             "luminance of a white diffuser in the scene, or of white in an image (default 1, or the value that the "
+             "image states)",
              [&s](double value) {
                s.luminance_cd_m2 = value;
                s.luminance_given = true;
              });
   app.add_option("--stars", s.stars, "number of stars to add")->check(CLI::Range(0, 1000000))->type_name("N");
   add_number(app, "--star-luminance", "CD_M2",
-             "of the faintest star's light, spread over one pixel (default: a tenth of --luminance)",
+             "luminance of the faintest star, its light spread over one pixel (default: a tenth of --luminance)",
              [&s](double value) { s.star_luminance_cd_m2 = value; });
   add_text(app, "--lamp", "X,Y,LIGHT,CD_M2",
            "add a distant lamp at a pixel, its light spread over one pixel; repeatable",
@@ -160,20 +159,21 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
       return out && *out >= 0 ? Wrong() : "is not a number of at least 0";
     })->group("Sensor figures");
   };
-  figure("--dark-temperature", "C", "temperature at which the dark current is stated", f.dark_temperature_c);
-  figure("--dark-doubling", "C", "degrees over which the dark current doubles", f.dark_doubling_c);
-  not_negative("--dark-activation", "EV", "activation energy: an Arrhenius law in place of the doubling",
+  figure("--dark-temperature", "C", "temperature at which --dark-current is stated", f.dark_temperature_c);
+  figure("--dark-doubling", "C", "temperature difference over which the dark current doubles", f.dark_doubling_c);
+  not_negative("--dark-activation", "EV", "activation energy of an Arrhenius law, which replaces --dark-doubling",
                f.dark_activation_ev);
   not_negative("--dark-floor", "E_PER_S", "part of the dark current that does not depend on temperature",
                f.dark_floor_e_per_s);
   figure("--prnu", "RATIO", "photo response non-uniformity", f.prnu);
-  figure("--dsnu", "RATIO", "dark signal non-uniformity, of the dark current", f.dsnu);
+  figure("--dsnu", "RATIO", "dark signal non-uniformity, relative to the dark current", f.dsnu);
   figure("--hot-pixels", "RATIO", "fraction of pixels that are hot", f.hot_pixel_fraction);
   figure("--hot-current", "E_PER_S", "mean dark current of hot pixels", f.hot_pixel_current_e_per_s);
   figure("--telegraph-pixels", "RATIO", "fraction of pixels with random telegraph noise", f.telegraph_fraction);
-  figure("--telegraph-noise", "E", "mean distance of the two levels of these pixels", f.telegraph_e);
+  figure("--telegraph-noise", "E", "mean difference of the two levels of random telegraph noise in electrons",
+         f.telegraph_e);
   figure("--crosstalk", "RATIO", "fraction of a pixel's light that each of four neighbours collects", f.crosstalk);
-  figure("--glow", "E_PER_S", "amplifier glow: its dark current at its source", f.glow_e_per_s);
+  figure("--glow", "E_PER_S", "amplifier glow: additional dark current at its source", f.glow_e_per_s);
   add_text(app, "--glow-position", "X,Y",
            "position of the source of the glow, in widths and heights (default 1,1: lower right corner)",
            [&f](const std::string& text) -> Wrong {
@@ -215,15 +215,16 @@ void add_camera(CLI::App& app, SimulateArgs& args) {
       app, "--cfa",
       {{"rggb", BayerPhase::rggb}, {"grbg", BayerPhase::grbg}, {"gbrg", BayerPhase::gbrg}, {"bggr", BayerPhase::bggr}},
       [&o](BayerPhase phase) { o.phase = phase; }, "Bayer pattern (default rggb)");
-  app.add_option("--masked-columns", o.masked_columns, "light-shielded columns left of the picture (even; default 0)")
+  app.add_option("--masked-columns", o.masked_columns,
+                 "light-shielded columns left of the image (an even number; default 0)")
       ->type_name("N");
 }
 
 void add_work(CLI::App& app, SimulateArgs& args, std::optional<int>& frames) {
   capture::SyntheticOptions& o = args.options;
   add_text(app, "--effects", "auto|all|none|LIST",
-           "noise sources to simulate: those that matter in the scene (auto; default, but all with --sampling "
-           "published), or names separated by commas (-prnu is all except one)",
+           "noise sources to simulate: those that matter in the scene (auto), all, none, or a list of names; -prnu is "
+           "all except PRNU (default: auto; with --sampling published all)",
            [&args](const std::string& text) {
              args.effects = text;
              return set_effects(text, args.options.effects);
@@ -232,29 +233,30 @@ void add_work(CLI::App& app, SimulateArgs& args, std::optional<int>& frames) {
       app, "--sampling",
       {{"physical", capture::PhotonSampling::physical}, {"published", capture::PhotonSampling::published}},
       [&o](capture::PhotonSampling sampling) { o.sampling = sampling; },
-      "photons: one Poisson draw for each pixel (default), or one for each wavelength as in the thesis");
+      "Poisson draws of photons: one for each pixel (physical, default), or one for each wavelength as in the thesis "
+      "(published)");
   add_seed(app, "--seed",
-           "seed of the noise, the stars and the motion (default 1); use different seeds for darks and lights whose "
-           "noise must be independent",
+           "seed of noise, stars and motion (default 1); darks and lights with independent noise need different seeds",
            o.seed);
-  add_seed(app, "--sensor-seed", "seed of the fixed pattern, which stands for the specimen of the sensor (default 1)",
-           o.sensor_seed);
+  add_seed(app, "--sensor-seed", "seed of the fixed pattern of the sensor (default 1)", o.sensor_seed);
   app.add_option("--frames", frames,
-                 "number of frames, OUT_0000.dng and following (default 1, or the exposures of --bracket)")
+                 "number of frames, written as OUT_0000.dng, OUT_0001.dng... (default 1, or one for each exposure of "
+                 "--bracket)")
       ->check(CLI::Range(1, 10000))
       ->type_name("N");
-  app.add_flag("--explain", args.explain, "print the predicted change of each effect, the decision and the time saved");
+  app.add_flag("--explain", args.explain,
+               "print for each noise source the predicted change, the decision and the time saved");
 }
 
 void add_files(CLI::App& app, SimulateArgs& args) {
   app.add_option("-o,--output", args.output, "raw file to write (.dng)")->type_name("OUT.dng");
   auto* truth = app.add_option("--truth", args.truth,
-                               "the noise-free scene, linear, white at --luminance (.exr, .pfm, .tif; default "
-                               "OUT.truth.exr, none for a dark frame)")
+                               "file of the noise-free linear scene, in which 1 is --luminance (.exr, .pfm, .tif; "
+                               "default: OUT.truth.exr; none for dark)")
                     ->type_name("FILE");
   app.add_flag("--no-truth", args.no_truth, "do not write the noise-free reference")->excludes(truth);
   app.add_option("--truth-electrons", args.truth_electrons,
-                 "also write the noise-free electrons of R, G and B at every pixel (.exr, .pfm, .tif)")
+                 "also write the noise-free electrons of R, G and B of each pixel to this file (.exr, .pfm, .tif)")
       ->type_name("FILE");
   app.add_flag("--list", args.list, "list the sensors, lights and cameras");
   app.add_flag("--force", args.force, "overwrite files that exist");
@@ -277,8 +279,8 @@ Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words) {
   std::optional<int> frames;
   add_work(app, args, frames);
   add_text(app, "--tolerance", "DE[,VARIANCE]",
-           "largest change by effects that are left out: CIEDE2000 of 32x32 block means, relative variance of blocks "
-           "(default 0.5,0.05)",
+           "largest change by noise sources that --effects auto leaves out: CIEDE2000 of 32x32 block means, relative "
+           "variance of blocks (default 0.5,0.05)",
            [&tolerance](const std::string& text) { return set_tolerance(text, tolerance.emplace()); });
   add_burst(app, args.burst);
   add_figures(app, args);

@@ -42,7 +42,7 @@ SimulateFiles files_of(const SimulateArgs& args) {
 }
 
 std::string wrong_files(const SimulateArgs& args) {
-  if (args.scene.what.empty()) return "SCENE is required: a picture, or dark, flat, chart; --help lists the options";
+  if (args.scene.what.empty()) return "SCENE is required: an image, or dark, flat, chart; --help lists the options";
   if (args.output.empty()) return "-o is required: the raw file to write";
   if (!args.output.ends_with(".dng")) return fmt::format("-o: raw files are written as .dng, not as {}", args.output);
   std::vector<std::string> pictures;
@@ -57,7 +57,7 @@ std::string wrong_files(const SimulateArgs& args) {
   }
   const SimulateFiles files = files_of(args);
   if (!files.truth.empty() && same_name(files.truth, files.truth_electrons)) {
-    return fmt::format("--truth-electrons: {} is the name of the truth too", files.truth_electrons);
+    return fmt::format("--truth-electrons: {} is also the name of --truth", files.truth_electrons);
   }
   return {};
 }
@@ -71,7 +71,7 @@ Result<void> check_free(const SimulateFiles& files, const SimulateArgs& args) {
   for (const std::string& file : all) {
     std::error_code ignored;
     if (fs::equivalent(file, args.scene.what, ignored)) {
-      return fail(ErrorCode::exists, fmt::format("{} would replace its own scene", file), file);
+      return fail(ErrorCode::exists, fmt::format("{} would replace the scene", file), file);
     }
     if (auto place = check_place(file, args.force); !place) return place;
   }

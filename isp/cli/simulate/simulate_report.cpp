@@ -22,13 +22,13 @@ using Json = nlohmann::ordered_json;
 const char* reason_of(const isp::NoiseSourceDecision& decision, isp::NoiseSourceSet wanted) {
   switch (decision.reason) {
     case isp::NoiseSourceDecision::Reason::absent:
-      return decision.effect == isp::Effect::lens_blur ? "no blur, or none in even light" : "the sensor has none";
+      return decision.effect == isp::Effect::lens_blur ? "no blur, or even light" : "the sensor has none";
     case isp::NoiseSourceDecision::Reason::negligible:
       return "below the tolerance together with all other effects that are left out";
     case isp::NoiseSourceDecision::Reason::asked_for:
-      return wanted.has(decision.effect) && !decision.kept ? "nothing without dark current" : "as asked";
+      return wanted.has(decision.effect) && !decision.kept ? "has no effect without dark current" : "as asked";
     case isp::NoiseSourceDecision::Reason::free:
-      return "negligible, but leaving it out saves nothing";
+      return "negligible, but leaving it out saves no time";
     case isp::NoiseSourceDecision::Reason::needed:
       break;
   }

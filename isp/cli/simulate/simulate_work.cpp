@@ -137,7 +137,7 @@ class Simulation {
     const std::string reduced =
         args_.scene.reduction > 1 ? fmt::format(", reduced by {},", args_.scene.reduction) : std::string();
     return fail(ErrorCode::insufficient,
-                fmt::format("the picture{} has {} x {} pixels, but raw developers need at least {} x {}: enlarge it",
+                fmt::format("the image{} has {} x {} pixels, but raw developers need at least {} x {}: enlarge it",
                             reduced, width, height, min_side, min_side));
   }
 
@@ -163,7 +163,7 @@ class Simulation {
     if (!source) return tl::make_unexpected(source.error());
     if (source->moved_pixels() > 0) {
       out_.warnings.push_back(fmt::format(
-          "{} pixels have colours that no light can have: they were moved towards white", source->moved_pixels()));
+          "{} pixels have colours outside the spectral locus: they were moved towards white", source->moved_pixels()));
     }
     report_plan(*source, args_.explain, executor_, out_);
     if (const auto done = write_frames(*source); !done) return tl::make_unexpected(done.error());

@@ -66,7 +66,7 @@ TEST_F(CalibrateFolder, AnEmptyFolderIsOneError) {
   for (const char* kind : {"black", "noise"}) {
     const auto result = lowlux({"calibrate", kind, file("empty"), "-o", file("p.json")});
     EXPECT_EQ(result.exit_code, 1);
-    EXPECT_EQ(result.err, "lowlux: " + file("empty") + ": the folder holds no raw files\n");
+    EXPECT_EQ(result.err, "lowlux: " + file("empty") + ": the folder contains no raw files\n");
   }
 }
 

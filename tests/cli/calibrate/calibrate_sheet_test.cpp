@@ -172,8 +172,8 @@ TEST_F(DataSheetCommand, FlatsMayWarmUpAndMissingDarksAreWarnedOf) {
   EXPECT_NEAR(json["figures"]["prnu_pixel"]["value"], prnu,
               5 * json["figures"]["prnu_pixel"]["standard_error"].get<double>());
   ASSERT_EQ(json["warnings"].size(), 2u) << json["warnings"];
-  EXPECT_TRUE(holds(done.err, "PRNU contains the nonuniformity of dark current")) << done.err;
-  EXPECT_TRUE(holds(done.err, "quantum efficiency contains dark current")) << done.err;
+  EXPECT_TRUE(holds(done.err, "the non-uniformity of dark current is not subtracted from PRNU")) << done.err;
+  EXPECT_TRUE(holds(done.err, "dark current is not subtracted for the quantum efficiency")) << done.err;
   EXPECT_TRUE(holds(done.err, "at 24 C")) << done.err;
 }
 

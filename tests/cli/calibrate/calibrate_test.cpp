@@ -324,7 +324,7 @@ TEST_F(Calibrate, BadFramesAreOneErrorAndNoProfile) {
   const Words more = shoot("m", "dark", "1", 2);
   refused({"calibrate", "noise", more[0], more[1], "--darks", dark[0] + "," + dark[1]}, "not brighter than the darks");
   refused({"calibrate", "noise", more[0], wide[0], "--darks", dark[0] + "," + dark[1]}, "130 x 128 pixels");
-  refused({"calibrate", "noise", more[0], "--darks", dark[0] + "," + dark[1]}, "no two flats make a pair");
+  refused({"calibrate", "noise", more[0], "--darks", dark[0] + "," + dark[1]}, "no two flats form a pair");
   std::filesystem::create_directories(file("empty"));
   refused({"calibrate", "noise", more[0], "--darks", file("empty")}, "no raw files");
   refused({"calibrate", "quoted", "nosuch"}, "nosuch");
@@ -338,8 +338,8 @@ TEST_F(Calibrate, WrongCommandLinesAreSaid) {
     EXPECT_EQ(done.exit_code, 2) << why;
     EXPECT_TRUE(holds(done.err, why)) << done.err;
   };
-  usage({"calibrate"}, "name what to calibrate: black, colour, noise, quoted, sheet");
-  usage({"calibrate", "--json", "black"}, "sheet, before any option");
+  usage({"calibrate"}, "the first argument must be one of black, colour, noise, quoted, sheet");
+  usage({"calibrate", "--json", "black"}, "sheet; --help describes them");
   usage({"calibrate", "grey"}, "unknown kind 'grey'");
   usage({"calibrate", "black", "-o", file("p.json")}, "FRAMES");
   usage({"calibrate", "black", "a.dng"}, "--output");
@@ -374,12 +374,14 @@ TEST_F(Calibrate, NoInputAndNoOutputIsReplacedByAnother) {
     EXPECT_EQ(done.exit_code, 2) << why;
     EXPECT_TRUE(holds(done.err, why)) << done.err;
   };
-  usage({"calibrate", "black", dark[0], dark[1], "-o", dark[0], "--force"}, "profiles are .json");
+  usage({"calibrate", "black", dark[0], dark[1], "-o", dark[0], "--force"},
+        "the name of a profile must end with .json");
   usage({"calibrate", "black", dark[0], dark[0], "-o", file("p.json")}, "given twice");
   usage({"calibrate", "noise", dark[0], "--darks", dark[1] + "," + dark[0], "-o", file("p.json")}, "given twice");
   usage({"calibrate", "black", dark[0], "-o", file("p.json"), "--report", file("p.json")}, ".html");
-  usage({"calibrate", "noise", dark[0], "-o", file("p.json"), "--steady-light"}, "for flats");
-  usage({"calibrate", "noise", dark[0], "--darks", dark[1], "-o", file("p.json"), "--method", "foi"}, "one picture");
+  usage({"calibrate", "noise", dark[0], "-o", file("p.json"), "--steady-light"}, "applies to flats");
+  usage({"calibrate", "noise", dark[0], "--darks", dark[1], "-o", file("p.json"), "--method", "foi"},
+        "one ordinary image");
   usage({"develop", dark[0], "-o", file("p.png"), "--black", "a.json", "--profile", "b.json"}, "both name a profile");
   EXPECT_EQ(scratch_.read("d_0000.dng"), before);
 }

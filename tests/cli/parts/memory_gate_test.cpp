@@ -47,7 +47,7 @@ Crowd crowd(double limit_bytes, std::size_t file_bytes) {
 TEST(MemoryGate, AsManyFilesAsMemoryHoldsAndAlwaysOne) {
   const Crowd three = crowd(3.9e6, 1'200'000);
   EXPECT_EQ(three.most, 3);
-  EXPECT_EQ(three.text, "3 at a time, limited by memory: about 1 MB for each, 4 MB for all");
+  EXPECT_EQ(three.text, "3 files in parallel, limited by memory: about 1 MB for each, 4 MB for all");
   EXPECT_EQ(crowd(1e6, 5'000'000).most, 1);
   const Crowd all = crowd(1e9, 1'000);
   EXPECT_GT(all.most, 3);

@@ -21,7 +21,8 @@ TEST(Module, OfAnotherBuildIsRefusedByNameThoughItHasTheFunction) {
     const auto found = load(name);
     ASSERT_FALSE(found) << name;
     EXPECT_EQ(found.error().code, ErrorCode::unreadable);
-    EXPECT_NE(found.error().message.find(std::string(name) + ".so is of another build of lowlux"), std::string::npos)
+    EXPECT_NE(found.error().message.find(std::string(name) + ".so belongs to another build of lowlux"),
+              std::string::npos)
         << found.error().message;
   }
 }

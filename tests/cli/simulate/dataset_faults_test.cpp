@@ -103,7 +103,7 @@ TEST_F(DatasetFaults, DeepNestingIsOneLine) {
   scratch_.write("spec.json", R"({"scenes":["flat\"\\)" + std::string(deep, '[') + "\"]" + rest + "}");
   refused("there is no such file");
   scratch_.write("spec.json", R"({"scenes":[)" + brackets(62) + "]" + rest + "}");
-  refused("is not a text");
+  refused("is not a string");
 }
 
 TEST_F(DatasetFaults, ADamagedSampleThatIsNestedDeeplyIsMadeAgain) {

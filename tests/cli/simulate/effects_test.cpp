@@ -141,7 +141,7 @@ TEST_F(EffectsCommand, GoByTheMachinesPace) {
   EXPECT_LT(now["pace"].get<double>(), 0.01);
   EXPECT_LT(now["predicted_s"].get<double>(), 0.01 * calibrated["predicted_s"].get<double>());
   const auto told = developed({"--budget-ms", "1000", "--explain"});
-  EXPECT_NE(told.out.find("times as slow as when its speed was measured"), std::string::npos) << told.out;
+  EXPECT_NE(told.out.find("times as long as when its speed was measured"), std::string::npos) << told.out;
   keep_speed(0);
   EXPECT_EQ(developed({"--budget-ms", "1000", "--explain"}).out.find("when its speed was measured"), std::string::npos);
 }

@@ -212,7 +212,7 @@ TEST_F(SimulateBurst, OptionsThatWouldDoNothingOrContradictAreRefused) {
       {{"--frames", "4", "--bracket", "0,1,2"}, "4 is not a multiple of the 3 exposures"},
       {{"--frames", "2", "--shake", "2", "--sampling", "published"}, "published"}};
   for (const auto& [options, clue] : wrong) expect_refused("chart", options, 2, clue);
-  expect_refused("dark", {"--movers", "2", "--stars", "4"}, 2, "it is dark");
+  expect_refused("dark", {"--movers", "2", "--stars", "4"}, 2, "has no effect on the scene dark");
 }
 
 TEST_F(SimulateBurst, ValuesOutsideTheirRangesAreRefused) {

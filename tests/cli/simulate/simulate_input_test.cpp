@@ -98,9 +98,9 @@ TEST_F(SimulateInput, ImpossibleSensorsAreRefused) {
                 {{"--telegraph-pixels", "2", "--telegraph-noise", "1"}, "between 0 and 1, found 2"},
                 {{"--telegraph-noise", "-1"}, "telegraph noise"},
                 {{"--crosstalk", "0.25"}, "between 0 and 0.2 of a pixel's light for each neighbour, found 0.25"},
-                {{"--crosstalk", "0.01", "--sampling", "published"}, "leave crosstalk out of the effects"},
+                {{"--crosstalk", "0.01", "--sampling", "published"}, "crosstalk: leave it out of the effects"},
                 {{"--lens-blur", "11"}, "between 0 and 10 px, found 11"},
-                {{"--lens-blur", "1", "--sampling", "published"}, "leave lens-blur out of the effects"},
+                {{"--lens-blur", "1", "--sampling", "published"}, "lens-blur: leave it out of the effects"},
                 {{"--glow", "2e6"}, "between 0 and 1e6 e-/s, found 2e+06"},
                 {{"--glow", "1", "--glow-position", "1,3"}, "between -1 and 2 widths and heights, found 3"},
                 {{"--glow", "1", "--glow-position", "1"}, "is not two numbers"},
@@ -113,7 +113,7 @@ TEST_F(SimulateInput, ImpossibleSensorsAreRefused) {
                 {{"--peak-qe", "1.5"}, "quantum efficiency"},
                 {{"--iso", "0"}, "ISO"},
                 {{"--iso", "1e-300"}, "ISO"},
-                {{"--white-luminance", "0"}, "fills a pixel"},
+                {{"--white-luminance", "0"}, "reaches full well"},
                 {{"--quantise", "up"}, "round, floor"}});
 }
 
@@ -235,7 +235,7 @@ TEST_F(SimulateInput, LightsThatCannotBeAreRefused) {
     expect_refused("flat", options, 1, "one spectrum");
   }
   for (const Words& options : std::vector<Words>{{"--light", negative}, {"--lamp", "3,3," + negative + ",1"}}) {
-    expect_refused("flat", options, 1, "negative power");
+    expect_refused("flat", options, 1, "must not be negative");
   }
   for (const std::string& light : {dark, invisible, endless}) {
     expect_refused("chart", {"--light", light}, 2, "finite number");
@@ -294,7 +294,7 @@ TEST_F(SimulateInput, FilesThatCannotBeWrittenAreRefusedBeforeAnyIs) {
 TEST_F(SimulateInput, ATruthNeverReplacesItsScene) {
   const std::string scene = picture("scene.pfm", pfm_of(grey(0.5F)));
   const std::string before = test::read_file(scene);
-  expect_refused(scene, {"--truth", scene, "--force"}, 1, "own scene");
+  expect_refused(scene, {"--truth", scene, "--force"}, 1, "would replace the scene");
   EXPECT_EQ(test::read_file(scene), before);
 }
 

@@ -80,7 +80,7 @@ TEST_F(SimulateOptions, AListOfEffectsToLeaveOutIsAllButThose) {
 TEST_F(SimulateOptions, DsnuIsLeftOutWithDarkCurrentAndTheReasonSaid) {
   auto found = decisions("all,-dark-current");
   EXPECT_EQ(found["dsnu"]["kept"], false);
-  EXPECT_EQ(found["dsnu"]["reason"], "nothing without dark current");
+  EXPECT_EQ(found["dsnu"]["reason"], "has no effect without dark current");
   EXPECT_EQ(found["dark-current"]["reason"], "as asked");
   EXPECT_EQ(decisions("all")["dsnu"]["reason"], "as asked");
   EXPECT_EQ(decisions("photon-noise,clipping")["dsnu"]["reason"], "as asked");
