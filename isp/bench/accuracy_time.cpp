@@ -74,7 +74,7 @@ Plot plot_of(const std::string& stage, std::size_t number, std::span<const Accur
   }
   plot.series.push_back(std::move(line));
   plot.name_points = true;
-  plot.caption = "No other level is faster and as good, or better and as fast: " + names;
+  plot.caption = "Pareto-optimal levels: " + names;
   return plot;
 }
 
@@ -157,7 +157,7 @@ BenchOutcome accuracy_outcome(const std::string& stage, std::span<const Accuracy
 }
 
 std::string timing_remark(const AccuracyTiming& timing, int threads) {
-  return fmt::format("Times: median of {} rounds in which all levels of a case and memcpy took turns; {} of {}; {}",
+  return fmt::format("Times: median of {} rounds in which all levels of a case and memcpy alternate; {} of {}; {}",
                      timing.rounds, timing.wall_clock ? "wall clock" : "CPU time",
                      threads == 1 ? std::string("one thread") : fmt::format("{} threads", threads),
                      raw_to_rgb_target());

@@ -148,8 +148,7 @@ Result<BenchPicture> read_bench_picture(const std::string& path, int crop_width,
   }
   if (std::min(xyz->width(), xyz->height()) < metric_patch_px) {
     return fail(ErrorCode::insufficient,
-                "the picture is smaller than " + std::to_string(metric_patch_px) + " pixels, the side of a patch",
-                path);
+                "the image is smaller than " + std::to_string(metric_patch_px) + " pixels, the side of a patch", path);
   }
   const SceneLinear display = shown(*xyz, path.ends_with(".exr") || path.ends_with(".pfm"), executor);
   const int width = crop_width > 0 ? std::min(crop_width, display.width()) : display.width();

@@ -79,17 +79,17 @@ std::string note_on(const Agreement& a) {
            "extrapolated them: see mesopic-tracks/cao-extrapolated";
   }
   if (has(a.pair, "khan_pattanaik")) {
-    return "Khan & Pattanaik leave luminance and the mixture with daylight open: both are ours";
+    return "Khan & Pattanaik do not define luminance and the mixture with daylight: both are our choice";
   }
   if (has(a.pair, "icam06")) {
     return fmt::format(
         "Shin's table is not public, and iCAM06 is used without local contrast: a* and b* alone differ "
-        "by {:.2f} in the first reading",
+        "by {:.2f} by the first interpretation",
         a.without_lightness);
   }
   return fmt::format(
       "Shin's table is not public: SHIN-SUB-1 fades chroma evenly from 1000 cd/m2 down, where the spectral model has "
-      "daylight still; the first reading with the table looked up in lux gives {:.2f}",
+      "daylight still; the first interpretation with the table looked up in lux gives {:.2f}",
       a.ours[reading_by_lux]);
 }
 
@@ -131,7 +131,7 @@ Finding figure_of(const std::string& experiment, const std::string& table, const
   return {fmt::format("{}/{}-{}", experiment, pair.first, pair.second),
           fmt::format("mean Delta E ab of {} and {}, 10GY 6/10 at 14 levels ({})", pair.first, pair.second, table),
           fmt::format("{:.2f}", pair.delta_e),
-          fmt::format("{:.2f}{}; {:.2f} to {:.2f} in {} readings", first, printed_text, least, most, readings),
+          fmt::format("{:.2f}{}; {:.2f} to {:.2f} in {} interpretations", first, printed_text, least, most, readings),
           near || (least <= pair.delta_e && pair.delta_e <= most),
           note_on(agreement),
           Finding::Kind::published,
@@ -176,7 +176,7 @@ Result<Plot> difference_plot(const std::string& id, std::span<const PublishedPai
     }
     plot.series.push_back(std::move(series));
   }
-  plot.caption = "In the first reading; their means are the findings' first figures.";
+  plot.caption = "By the first interpretation; their means are the first figures of the findings.";
   return plot;
 }
 
@@ -198,8 +198,8 @@ Finding agrees_less(std::span<const Agreement> fixed, std::span<const Agreement>
   return {fmt::format("mesopic-fixed-gamma/less-{}", model),
           fmt::format("without adaptation the spectral model agrees less with {} (Tables 5-1 and 5-2)", model),
           fmt::format("{:.2f} for {:.2f}", without.pair.delta_e, with.pair.delta_e),
-          fmt::format("{:.2f} for {:.2f}; less in {} of {} readings", without.ours.front(), with.ours.front(), less,
-                      readings),
+          fmt::format("{:.2f} for {:.2f}; less in {} of {} interpretations", without.ours.front(), with.ours.front(),
+                      less, readings),
           less == readings,
           note,
           Finding::Kind::published,
@@ -243,8 +243,8 @@ Result<Outcome> run_mesopic_fixed_gamma(const RunOptions& /*options*/) {
   Outcome out;
   for (const Agreement& a : *fixed) out.findings.push_back(figure_of("mesopic-fixed-gamma", "Table 5-2", a));
   out.findings.push_back(agrees_less(*fixed, *adaptive, "shin",
-                                     "by Eq. 5.1 as printed and coefficients by cd/m2 it gains in twilight, where "
-                                     "gamma = 2 takes the green away, what it loses by day"));
+                                     "by Eq. 5.1 as printed and with coefficients by cd/m2, it is better in twilight, "
+                                     "where gamma = 2 removes the green, by as much as it is worse by day"));
   out.findings.push_back(agrees_less(*fixed, *adaptive, "icam06", "10GY 6/10 at 14 levels"));
   out.findings.push_back(fades_by_day(*stiff, *grown));
   out.plots = {track_plot("mesopic-fixed-gamma-tracks", *stiff, chips), *std::move(differences)};

@@ -38,7 +38,7 @@ std::size_t readings_with(const Claim& claim) {
   return out;
 }
 
-std::string in_readings(std::size_t count) { return fmt::format("in {} of {} readings", count, readings); }
+std::string in_readings(std::size_t count) { return fmt::format("in {} of {} interpretations", count, readings); }
 
 std::vector<Finding> order_of_agreement(std::span<const Agreement> all) {
   const auto at = [&](std::size_t pair, std::size_t reading) { return all[pair].ours[reading]; };
@@ -60,7 +60,8 @@ std::vector<Finding> order_of_agreement(std::span<const Agreement> all) {
            "15.78 at most, 21.64 at least", in_readings(parted), parted == readings,
            "Table 5-1, pairs without Cao: the order, and not its figures", Finding::Kind::published, true},
           {"mesopic-tracks/order", "those six pairs come in the order of Table 5-1", "in order", in_readings(sorted),
-           sorted == readings, "neighbours in that order differ by less than one pair does between readings"}};
+           sorted == readings,
+           "adjacent pairs in that order differ by less than one pair differs between interpretations"}};
 }
 
 /// Reports whether Cao is farther than Khan & Pattanaik. @param why  reason why it is not, or not by as much
@@ -72,7 +73,7 @@ Finding cao_is_far(std::span<const Agreement> all, std::string_view model, const
   return {fmt::format("mesopic-tracks/cao-from-{}", model),
           fmt::format("Cao is farther from {} than Khan & Pattanaik is (Table 5-1)", model),
           fmt::format("{:.1f} times as far", cao.pair.delta_e / khan.pair.delta_e),
-          fmt::format("{:.2f} to {:.2f} times as far in {} readings", least, most, readings),
+          fmt::format("{:.2f} to {:.2f} times as far in {} interpretations", least, most, readings),
           least > 1,
           why,
           Finding::Kind::published,

@@ -35,12 +35,12 @@ constexpr std::array left_out{
         "its spectra are published for research only and are not bundled: the first halves are 24 ColorChecker "
         "reflectances, and the smoothest lights of the same colours under D65 stand for the second halves, "
         "whose difference under illuminant A is the largest possible"},
-    NotReproduced{"the thesis' 598 spectra, its seven pictures, Shin's table of coefficients",
+    NotReproduced{"the thesis' 598 spectra, its seven images, Shin's table of coefficients",
                   "they are not public: README.md of isp/reproduce names the substitutes"},
     NotReproduced{"the extrapolation of Cao's weights below 0.1 cd/m2 in Table 5-1",
                   "it is not published; none of three extrapolations in either direction gives the published figures: "
                   "see mesopic-tracks/cao-extrapolated"},
-    NotReproduced{"observers' judgements of retargeted pictures", "lowlux computes, it asks no observers"},
+    NotReproduced{"observers' judgements of retargeted images", "lowlux computes, it asks no observers"},
 };
 
 }  // namespace

@@ -46,13 +46,13 @@ Finding forward_is_farther(const DisplayScores& at) {
   const double none = mean_delta_e(at.of(RetargetMethod::none)), icam = mean_delta_e(at.of(RetargetMethod::icam06));
   const double published = by_icam06.delta_e_94c / unprocessed.delta_e_94c;
   return {"retargeting/icam06-farther",
-          "iCAM06, applied forward, leaves pictures farther from their look at 250 cd/m2 than unprocessed ones: mean "
+          "iCAM06, applied forward, leaves images farther from their look at 250 cd/m2 than unprocessed ones: mean "
           "Delta E 94c (Table 5-5)",
           fmt::format("{:.2f} for {:.2f}, {:.2f} times", by_icam06.delta_e_94c, unprocessed.delta_e_94c, published),
           fmt::format("{:.2f} for {:.2f}, {:.2f} times", icam, none, icam / none),
           icam > none,
-          "max_L = 2 cd/m2, p = 0.7, gamma = 1 (section 5.4.2), without local contrast; the factors are compared, "
-          "because the pictures are others",
+          "max_L = 2 cd/m2, p = 0.7, gamma = 1 (section 5.4.2), without local contrast; factors are compared, because "
+          "the images differ from those of the thesis",
           Finding::Kind::published,
           !figures_agree({{published, icam / none}})};
 }
@@ -60,12 +60,13 @@ Finding forward_is_farther(const DisplayScores& at) {
 Finding forward_shows_more(const DisplayScores& at) {
   const double none = mean_gamut(at.of(RetargetMethod::none)), icam = mean_gamut(at.of(RetargetMethod::icam06));
   return {"retargeting/icam06-gamut",
-          "iCAM06, applied forward, shows more of the pictures' gamut than unprocessed ones: mean EGR (Table 5-6)",
+          "iCAM06, applied forward, shows more of the images' gamut than unprocessed ones: mean EGR (Table 5-6)",
           fmt::format("{:.1f} % for {:.1f} %", by_icam06.gamut_percent, unprocessed.gamut_percent),
           fmt::format("{} for {}", percent_text(icam), percent_text(none)),
           icam > none,
-          "the thesis does not state how the response becomes light again: here relative to the response to white, so "
-          "that the rods' share of it greys all colours; iCAM06's adjustment of colourfulness is left out",
+          "the thesis does not state how responses are converted to light; here they are relative to the response to "
+          "white, so the contribution of the rods desaturates all colours; the colourfulness adjustment of iCAM06 is "
+          "not applied",
           Finding::Kind::published,
           !figures_agree({{by_icam06.gamut_percent, icam}})};
 }
@@ -74,18 +75,19 @@ std::vector<Finding> published_findings(const DisplayScores& at, const Retargeti
   const PictureScores &none = at.of(RetargetMethod::none), &shin = at.of(RetargetMethod::shin);
   const PictureScores& cao = at.of(RetargetMethod::cao);
   return {{"retargeting/closer",
-           "Shin's inverse brings pictures at 2 cd/m2 closer to their look at 250: mean Delta E 94c (Table 5-5)",
+           "Shin's inverse brings images at 2 cd/m2 closer to their look at 250: mean Delta E 94c (Table 5-5)",
            fmt::format("{:.2f} for {:.2f}", inverse.delta_e_94c, unprocessed.delta_e_94c),
            fmt::format("{:.2f} for {:.2f}", mean_delta_e(shin), mean_delta_e(none)),
            mean_delta_e(shin) < mean_delta_e(none), measured_how(work), Finding::Kind::published,
            !figures_agree({{inverse.delta_e_94c, mean_delta_e(shin)}, {unprocessed.delta_e_94c, mean_delta_e(none)}})},
-          {"retargeting/gamut", "Shin's inverse shows more of the pictures' gamut at 2 cd/m2: mean EGR (Table 5-6)",
+          {"retargeting/gamut", "Shin's inverse shows more of the images' gamut at 2 cd/m2: mean EGR (Table 5-6)",
            fmt::format("{:.1f} % for {:.1f} %", inverse.gamut_percent, unprocessed.gamut_percent),
            fmt::format("{} for {}", percent_text(mean_gamut(shin)), percent_text(mean_gamut(none))),
            mean_gamut(shin) > mean_gamut(none), "convex hulls in a*, b*", Finding::Kind::published,
            !figures_agree({{inverse.gamut_percent, mean_gamut(shin)}, {unprocessed.gamut_percent, mean_gamut(none)}})},
           {"retargeting/cao",
-           "Cao's model, which the thesis calls Wanat & Mantiuk's, gains less than Shin's in both (Tables 5-5 and 5-6)",
+           "Cao's model, which the thesis attributes to Wanat & Mantiuk, improves both metrics less than Shin's "
+           "(Tables 5-5 and 5-6)",
            both(by_cao), both(cao), mean_delta_e(cao) > mean_delta_e(shin) && mean_gamut(cao) < mean_gamut(shin),
            fmt::format("mean Delta E 94c and EGR; unprocessed {}", both(none)), Finding::Kind::published,
            !agree(by_cao, cao)},
@@ -124,25 +126,28 @@ std::vector<Finding> our_findings(const DisplayScores& at, const RetargetingWork
   const Wins wins = wins_of(at);
   const std::string unit = at.units == ShinUnits::lux ? "-by-lux" : "";
   const std::string by = at.units == ShinUnits::lux ? ", coefficients by lux" : "";
-  const std::string least = fmt::format("{} of {} pictures", enough_pictures, work.pictures.size());
+  const std::string least = fmt::format("{} of {} images", enough_pictures, work.pictures.size());
   const std::string note =
       at.units == ShinUnits::lux
           ? "a white of 250 cd/m2 is 873 lx and nearly daylight to Shin's model, one of 2 cd/m2 is 7 lx"
-          : "coefficients looked up with 250 and 2 cd/m2 as they stand, as the thesis does";
+          : "coefficients looked up with 250 and 2 cd/m2 without conversion to lux, as in the thesis";
   const auto gamut_text = [&](const PictureScores& scores) { return percent_text(mean_gamut(scores)); };
   std::vector<Finding> out{
-      check_of("ours-delta-e" + unit, "ours beats Shin's inverse in Delta E 94c at 2 cd/m2" + by, least,
+      check_of("ours-delta-e" + unit,
+               "the method constrained is better than Shin's inverse in Delta E 94c at 2 cd/m2" + by, least,
                fmt::format("{} of {}, mean {:.2f} for {:.2f}", wins.delta_e, ours.size(), mean_delta_e(ours),
                            mean_delta_e(shin)),
                wins.delta_e >= enough_pictures, note),
-      check_of("ours-gamut" + unit, "ours beats Shin's inverse in EGR at 2 cd/m2" + by, least,
+      check_of("ours-gamut" + unit, "the method constrained is better than Shin's inverse in EGR at 2 cd/m2" + by,
+               least,
                fmt::format("{} of {}, mean {} for {}", wins.gamut, ours.size(), gamut_text(ours), gamut_text(shin)),
                wins.gamut >= enough_pictures, note)};
   if (at.units == ShinUnits::lux) return out;  // the other methods are not measured in this unit
   const PictureScores& wanat = at.of(RetargetMethod::wanat);
-  out.push_back(check_of("wanat", "Wanat & Mantiuk's own saturation and luminance curve is farther than Shin's inverse",
+  out.push_back(check_of("wanat",
+                         "the saturation and the luminance curve of Wanat & Mantiuk are worse than Shin's inverse",
                          "farther", both(wanat), mean_delta_e(wanat) > mean_delta_e(shin),
-                         "mean Delta E 94c and EGR; the thesis has Cao's model under that name"));
+                         "mean Delta E 94c and EGR; the thesis uses Cao's model under that name"));
   return out;
 }
 
@@ -178,15 +183,17 @@ Result<std::vector<Finding>> by_other_judges(const DisplayScores& at, const Reta
     against_inverse += fmt::format("{}{} {:.2f} for {:.2f}", comma, judge, means->ours, means->inverse);
     against_none += fmt::format("{}{} {:.2f} for {:.2f}", comma, judge, means->ours, means->none);
   }
-  const std::string enough = fmt::format("{} of {} judges", enough_judges, other_judges.size());
+  const std::string enough = fmt::format("{} of {} models", enough_judges, other_judges.size());
   return std::vector<Finding>{
-      check_of("ours-by-others", "ours is no worse than Shin's inverse by judges that are not Shin's model", enough,
-               against_inverse, no_worse >= enough_judges, "mean Delta E 94c at 2 cd/m2, ours for the inverse"),
-      check_of("closer-by-others", "ours is closer than the unprocessed picture by judges that are not Shin's model",
-               enough, against_none, closer >= enough_judges,
-               "ours for unprocessed; colours fade far less between 250 and 2 cd/m2 by Wanat & Mantiuk than by "
-               "SHIN-SUB-1, so that what undoes this is too colourful to that; Mikamo's model takes saturated colours "
-               "far out of all gamuts")};
+      check_of("ours-by-others", "the method constrained is not worse than Shin's inverse by other models than Shin's",
+               enough, against_inverse, no_worse >= enough_judges,
+               "mean Delta E 94c at 2 cd/m2, constrained for the inverse"),
+      check_of("closer-by-others",
+               "the method constrained is closer than the unprocessed image by other models than Shin's", enough,
+               against_none, closer >= enough_judges,
+               "constrained for unprocessed; between 250 and 2 cd/m2 colours fade far less by Wanat & Mantiuk than by "
+               "SHIN-SUB-1, so compensation by the latter is too colourful by the former; by Mikamo's model saturated "
+               "colours are far outside all gamuts")};
 }
 
 /// Reports the four claims on Figure 5-16 about displays of 1, 2, 5 and 10 cd/m2.
@@ -206,14 +213,14 @@ std::vector<Finding> of_figure_5_16(std::span<const DisplayScores> all) {
                          percent_text(mean_gamut(none)));
   }
   const std::string on = "on displays of 1, 2, 5 and 10 cd/m2 (Fig. 5-16)", note = "Shin's inverse for unprocessed";
-  const std::string order = "no figures are published with this claim; order of the means over the pictures";
-  return {{"retargeting/displays-closer", "compensated pictures are closer than unprocessed ones " + on, "closer",
+  const std::string order = "no figures are published with this claim; order of the means over the images";
+  return {{"retargeting/displays-closer", "compensated images are closer than unprocessed ones " + on, "closer",
            delta_e, closer, note + "; " + order},
-          {"retargeting/displays-gamut", "compensated pictures show more of the gamut than unprocessed ones " + on,
+          {"retargeting/displays-gamut", "compensated images show more of the gamut than unprocessed ones " + on,
            "more", gamut, wider, note + "; " + order},
-          {"retargeting/displays-delta-e-falls", "Delta E 94c of compensated pictures falls with luminance " + on,
+          {"retargeting/displays-delta-e-falls", "Delta E 94c of compensated images falls with luminance " + on,
            "falls", delta_e, falls, order},
-          {"retargeting/displays-gamut-rises", "EGR of compensated pictures rises with luminance " + on, "rises", gamut,
+          {"retargeting/displays-gamut-rises", "EGR of compensated images rises with luminance " + on, "rises", gamut,
            rises, order}};
 }
 
@@ -225,8 +232,9 @@ Finding on_other_displays(std::span<const DisplayScores> all) {
     holds = holds && mean_delta_e(ours) < mean_delta_e(shin) && mean_gamut(ours) > mean_gamut(shin);
     text += fmt::format("{}{:g} cd/m2: {} for {}", text.empty() ? "" : "; ", at.display_cd_m2, both(ours), both(shin));
   }
-  return check_of("ours-displays", "ours beats Shin's inverse in the mean on displays of other luminances", "in both",
-                  text, holds, "mean Delta E 94c and EGR, ours for the inverse");
+  return check_of("ours-displays",
+                  "the method constrained is better than Shin's inverse on average on displays of other luminances",
+                  "in both", text, holds, "mean Delta E 94c and EGR, constrained for the inverse");
 }
 
 }  // namespace

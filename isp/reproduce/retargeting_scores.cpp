@@ -141,10 +141,9 @@ Result<std::vector<PictureColours>> retargeting_pictures(const std::string& fold
   assert(sampling.colours > 0);
   std::error_code ignored;
   if (!std::filesystem::is_directory(folder, ignored)) {
-    return fail(
-        ErrorCode::not_found,
-        "there is no such folder of pictures: --pictures-folder names the testdata/pictures of lowlux's sources",
-        folder);
+    return fail(ErrorCode::not_found,
+                "there is no such folder of images: --pictures-folder names the testdata/pictures of lowlux's sources",
+                folder);
   }
   const auto files = files_of(PictureSet::all);
   std::vector<PictureColours> out;
@@ -218,8 +217,8 @@ std::string measured_how(const RetargetingWork& work) {
   std::size_t colours = 0;
   for (const PictureColours& picture : work.pictures) colours += picture.codes.size();
   return fmt::format(
-      "SHIN-SUB-1 looked up in cd/m2; Shin's model judges what was made by it: consistency, not perception; {} colours "
-      "of {} pictures (the thesis' seven are not public), tables of {} levels",
+      "SHIN-SUB-1 looked up in cd/m2; images made by Shin's model are scored by Shin's model, which tests consistency, "
+      "not perception; {} colours of {} images (the seven images of the thesis are not public), tables of {} levels",
       colours, work.pictures.size(), work.table_levels);
 }
 
@@ -228,10 +227,10 @@ std::vector<Plot> plots_of_retargeting(std::span<const DisplayScores> all, const
   constexpr auto delta_e = &RetargetScore::delta_e_94c;
   constexpr auto gamut = &RetargetScore::gamut_percent;
   std::vector<Plot> out{
-      plot_over("delta-e", "Pictures of 250 cd/m2 on dim displays", "display [cd/m2]", delta_e, all, false),
-      plot_over("gamut", "Gamut left on dim displays", "display [cd/m2]", gamut, all, false),
-      plot_over("delta-e-pictures", "Each picture at 2 cd/m2", "picture", delta_e, {&one, 1}, true),
-      plot_over("gamut-pictures", "Gamut left of each picture at 2 cd/m2", "picture", gamut, {&one, 1}, true)};
+      plot_over("delta-e", "Images for 250 cd/m2 on dim displays", "display [cd/m2]", delta_e, all, false),
+      plot_over("gamut", "Remaining gamut on dim displays", "display [cd/m2]", gamut, all, false),
+      plot_over("delta-e-pictures", "Each image at 2 cd/m2", "picture", delta_e, {&one, 1}, true),
+      plot_over("gamut-pictures", "Remaining gamut of each image at 2 cd/m2", "picture", gamut, {&one, 1}, true)};
   std::string names = "Pictures:";
   for (const PictureColours& picture : work.pictures) names += " " + picture.name;
   for (Plot& plot : out) plot.caption = names + ". " + measured_how(work) + ".";

@@ -156,8 +156,8 @@ Result<Finding> absorbed_by_rods() {
       "9.3 to 9.5 %",
       fmt::format("{:.0f} %", 100 * absorbed),
       figures_agree({{9.4, 100 * absorbed}}),
-      fmt::format("they assume that the retina absorbs 20 %; the rods' pigment, density {:.2f}, absorbs {:.0f} % "
-                  "of what enters them",
+      fmt::format("the paper assumes that the retina absorbs 20 %; the pigment of the rods, of density {:.2f}, absorbs "
+                  "{:.0f} % of the light that enters them",
                   path.optical_density, 100 * pigment)};
 }
 
@@ -197,7 +197,7 @@ Result<Finding> absorption_by_rods() {
 }
 
 Result<Plot> observed_curves() {
-  Plot plot{"retina", "Flashes that observers saw", "photons at the cornea N", "P(see)", AxisScale::logarithmic};
+  Plot plot{"retina", "Frequency of seeing flashes", "photons at the cornea N", "P(see)", AxisScale::logarithmic};
   for (const Observer& o : observers) {
     Series series{fmt::format("{}, {} flashes each", o.name, o.flashes), {}, {}, Mark::points};
     for (std::size_t i = 0; i < o.photons.size(); ++i) {

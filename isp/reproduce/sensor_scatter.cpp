@@ -147,7 +147,7 @@ std::vector<Finding> dark_ellipses(const SensorScenarios& s) {
       {"sensor-scenarios/dark-horizontal", "with dark noise the ellipses lie more horizontally (Fig. 4-8a)",
        "more horizontally",
        fmt::format("{:.0f} degrees from the horizontal in the mean, {:.0f} without", with, without), with < without,
-       "expected ellipses at 0.1 cd/m2, where dark current rules"},
+       "expected ellipses at 0.1 cd/m2, where dark current dominates"},
       {"sensor-scenarios/dark-turns", "with dark noise the ellipses' inclination depends on the level (Fig. 4-8a)",
        "differs by level", fmt::format("turns by {:.0f} degrees at most", turn), turn > 1,
        "expected ellipses from 100 to 0.1 cd/m2; turns by more than a degree"},

@@ -140,8 +140,8 @@ Finding saturation(const SensorScenarios& s) {
           "-",
           fmt::format("{} of {} samples flagged and left out, {} of them at 10 cd/m2 or below", flagged, total, dim),
           dim == 0,
-          "a channel at a code that a full pixel may have (254 or 255); the bluest patches fill blue more than a white "
-          "fills any channel",
+          "a channel has a code of a saturated pixel (254 or 255); the bluest patches give more charge in blue than "
+          "white in any channel",
           Finding::Kind::check};
 }
 
@@ -177,15 +177,15 @@ Result<Finding> published_sampling(const ThesisCamera& camera, const RunOptions&
                  "variance / mean 1 1 1",
                  fmt::format("{:.2f} {:.2f} {:.2f}", ratio[0], ratio[1], ratio[2]),
                  poisson,
-                 fmt::format("R, G, B with the peak of Qe at 1, its most favourable; {:.1f} standard errors from sum x "
-                             "Qe^2 / sum x Qe. Detected photons are a thinned Poisson process, with 1: the other "
-                             "findings are drawn so",
+                 fmt::format("R, G, B with a peak Qe of 1, the most favourable value; {:.1f} standard errors from sum "
+                             "x Qe^2 / sum x Qe. Detected photons are a thinned Poisson process, whose ratio is 1; the "
+                             "other findings are simulated in this way",
                              worst),
                  Finding::Kind::check};
 }
 
 Plot shift_plot(const SensorScenarios& s) {
-  Plot plot{"sensor-scenarios-shift", "What moves and what scatters chromaticities",
+  Plot plot{"sensor-scenarios-shift", "Shift and scatter of chromaticities",
             "luminance [cd/m2]",      "distance in xy",
             AxisScale::logarithmic,   AxisScale::logarithmic};
   const auto add = [&](const std::string& name, const std::vector<LevelResult>& levels, Mark mark, const auto& of) {
@@ -211,7 +211,7 @@ Plot shift_plot(const SensorScenarios& s) {
 }
 
 Plot cloud_plot(const SensorScenarios& s) {
-  Plot plot{"sensor-scenarios-clouds", "Scenario III at 10 cd/m2: everything on", "x", "y"};
+  Plot plot{"sensor-scenarios-clouds", "Scenario III at 10 cd/m2: all noise sources", "x", "y"};
   plot.equal_scales = true;
   plot.series.push_back(spectral_locus());
   Series truth{"truth", {}, {}, Mark::points}, samples{"samples", {}, {}, Mark::points};

@@ -105,8 +105,8 @@ TEST(DevelopingStages, ChromaFromWhereTheSignalSaysIsAsGoodAsTheBetterStart) {
     EXPECT_GT(error_of(rows, "4/200", std::string(level) + ", 0"), error_of(rows, "4/200", std::string(level) + ", 2"));
     EXPECT_LT(error_of(rows, "20/2", std::string(level) + ", 0"), error_of(rows, "20/2", std::string(level) + ", 2"));
   }
-  EXPECT_TRUE(rows.contains({"20/2, best, on parts", "best, auto"}));
-  EXPECT_FALSE(rows.contains({"20/2, best, on parts", "best, 1"}));
+  EXPECT_TRUE(rows.contains({"20/2, best, on crops", "best, auto"}));
+  EXPECT_FALSE(rows.contains({"20/2, best, on crops", "best, 1"}));
 }
 
 TEST(DevelopingStages, TablesOfMesopicVisionAreNoBetterThanWhatTheyAreMadeOf) {

@@ -51,9 +51,9 @@ TEST(Methods, CommandsNameTheirFiles) {
 }
 
 TEST(Methods, WrongCommandsAreRefusedWithAReason) {
-  const std::map<std::string, std::string> reasons{{"a=p {out}", "where the raw file {in} goes"},
-                                                   {"a=p {in}", "where the output {out} goes"},
-                                                   {"a=p {in} {out.gif}", "where the output {out} goes"},
+  const std::map<std::string, std::string> reasons{{"a=p {out}", "does not contain {in}"},
+                                                   {"a=p {in}", "does not contain {out}"},
+                                                   {"a=p {in} {out.gif}", "does not contain {out}"},
                                                    {"a=p {in} {out} {out.png}", "two kinds"},
                                                    {"=p {in} {out}", "not a name"},
                                                    {"a b=p {in} {out}", "not a name"},

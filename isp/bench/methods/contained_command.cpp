@@ -281,7 +281,7 @@ Result<CommandUse> run_contained(const std::string& command, const std::filesyst
   static std::mutex one_at_a_time;  // the setting of a subreaper is the process's
   const std::lock_guard turn(one_at_a_time);
   Pipes pipes;
-  if (!pipes.are_open()) return tl::make_unexpected(system_error("no pipe for a program", errno));
+  if (!pipes.are_open()) return tl::make_unexpected(system_error("cannot make a pipe for a program", errno));
   const Subreaper adopting;
   const std::string memory_kib =
       command_memory_is_limited ? fmt::format("{}", limits.max_memory_bytes / 1024) : "unlimited";

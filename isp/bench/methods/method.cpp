@@ -87,7 +87,7 @@ Result<ScoredMethod> ready_method(const std::string& name) {
     return fail(ErrorCode::not_found, "it is not installed: it needs " + std::string(ready.needs), "method " + name);
   }
   const auto near = near_matches(name, names);
-  return wrong_command(fmt::format("unknown method '{}'{}; ready are {}", name,
+  return wrong_command(fmt::format("unknown method '{}'{}; known methods are {}", name,
                                    near.empty() ? "" : fmt::format(", did you mean {}?", near.front()), all));
 }
 
@@ -190,7 +190,7 @@ Result<ScoredMethod> method_of(const std::string& text) {
 Result<ExpandedCommand> expand_command(const std::string& command, const std::filesystem::path& folder) {
   ExpandedCommand out{command, {}};
   if (replace_all(out.line, "{in}", shell_word((folder / noisy_file).string())) == 0) {
-    return wrong_command("the command does not say where the raw file {in} goes");
+    return wrong_command("the command does not contain {in}, the raw file");
   }
   int outputs = 0;
   const auto put = [&](std::string_view placeholder, std::string_view extension) {
@@ -203,8 +203,8 @@ Result<ExpandedCommand> expand_command(const std::string& command, const std::fi
   for (const std::string_view extension : extensions) {
     if (extension != "dng" || outputs == 0) put(fmt::format("{{out.{}}}", extension), extension);
   }
-  if (outputs == 0) return wrong_command("the command does not say where the output {out} goes");
-  if (outputs > 1) return wrong_command("the command names outputs of two kinds");
+  if (outputs == 0) return wrong_command("the command does not contain {out}, the output");
+  if (outputs > 1) return wrong_command("the command contains outputs of two kinds");
   return out;
 }
 

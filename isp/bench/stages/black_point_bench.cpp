@@ -201,14 +201,13 @@ Result<BenchOutcome> run_black_point_bench(const BenchOptions& options) {
   BenchOutcome out = outcome_of("black-point", rows, TimeOf::whole);
   out.findings = std::move(findings);
   out.remarks = {
-      "The truth is the sensor's pedestal with the mean dark charge; levels are pixels of each site, their plain mean "
-      "beside measure_masked_black(), which asks for 500 and leaves outliers out; errors are over the sites of so many "
-      "frames",
-      "Times are of one black point, not of a megapixel; memcpy is that of a megapixel of floats",
-      fmt::format(
-          "The grey has {:g} e- in green, {:g} and {:g} in red and blue, and is developed to 18 % of white; hot "
-          "pixels, where there are any, are neither in the truth nor in the closed form",
-          grey_e, grey_of_green[0] * grey_e, grey_of_green[2] * grey_e),
+      "The truth is the pedestal of the sensor plus the mean dark charge. Levels are numbers of pixels per site; their "
+      "plain mean is compared with measure_masked_black(), which needs 500 pixels and excludes outliers. Errors are "
+      "over the sites of this number of frames",
+      "Times are those of one black point, not of a megapixel; memcpy copies a megapixel of floats",
+      fmt::format("The grey has {:g} e- in green, {:g} and {:g} in red and blue, and is developed to 18 % of white. "
+                  "Neither the truth nor the closed form includes hot pixels",
+                  grey_e, grey_of_green[0] * grey_e, grey_of_green[2] * grey_e),
       timing_remark(timing, 1)};
   return out;
 }

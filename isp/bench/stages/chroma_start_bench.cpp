@@ -90,7 +90,7 @@ struct Bench {
     std::vector<Sample> samples = samples_of(pictures, light, executor);
     AccuracyGroup group{lowlux::isp::name_of(light), "mean CIEDE2000 against the truth", {}};
     for (const Level which : levels) {
-      if (which == Level::best) group.name += ", best, on parts";
+      if (which == Level::best) group.name += ", best, on crops";
       for (const std::optional<int> start : starts) {
         if (which == Level::best && start == 1) continue;  // best starts at 0 and 2 alone
         group.levels.push_back(level(samples, {.level = which, .white_gain = bench_white_gain, .chroma_start = start}));
@@ -124,8 +124,9 @@ Result<BenchOutcome> run_chroma_start_bench(const BenchOptions& options) {
   }
   BenchOutcome out = accuracy_outcome("chroma-start", rows, timing, 1);
   out.remarks.push_back(
-      fmt::format("{} pictures{}, as the stage denoise takes them; level `best` in {} rounds on parts of {} x {} of {}",
-                  whole ? whole->pictures.size() : small.pictures.size(), options.quick ? ", quick: parts of them" : "",
+      fmt::format("{} images{}, simulated like those of the stage denoise; level `best` in {} rounds on crops of {} x "
+                  "{} pixels of {}",
+                  whole ? whole->pictures.size() : small.pictures.size(), options.quick ? ", quick: crops of them" : "",
                   of_best.rounds, quick_part.width, quick_part.height, small.pictures.size()));
   return out;
 }

@@ -239,7 +239,7 @@ Result<BenchOutcome> run_dark_estimate_bench(const BenchOptions& options) {
   }
   const Result<std::string> spread = spread_of_dark_colours(*pictures, executor);
   if (!spread) return tl::make_unexpected(spread.error());
-  out.findings = {check_of("dark-estimate/harm", "no estimate is farther from the dark charge than no estimate is", "0",
+  out.findings = {check_of("dark-estimate/harm", "every estimate is closer to the dark charge than 0 is", "0",
                            std::to_string(worse), worse == 0)};
   out.remarks = {
       "Each frame is an image in a light that makes 3 to 300 e- in the mean over its pixels, exposed for 0.05 to 60 s "

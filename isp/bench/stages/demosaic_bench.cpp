@@ -218,10 +218,11 @@ Result<BenchOutcome> run_demosaic_bench(const BenchOptions& options) {
     options.advance(1 / static_cast<double>(groups.size()), "demosaicing: " + group.name);
   }
   BenchOutcome out = accuracy_outcome("demosaic", rows, timing, 1);
-  out.remarks.push_back(fmt::format(
-      "{} pictures{} behind a lens of {} px, RGGB, white gains 2, 1, 1.5; colours moved into the gamut before they are "
-      "compared; of half, the means alone are timed, and enlarged between their middles to be compared",
-      pictures->size(), options.quick ? ", quick: parts of them" : "", bench_lens_px));
+  out.remarks.push_back(
+      fmt::format("{} images{} with a lens blur of {} px, RGGB, white gains 2, 1, 1.5. Colours are moved into the "
+                  "gamut before they are compared. For half, only the time of the means is measured; they are enlarged "
+                  "by interpolation for the comparison",
+                  pictures->size(), options.quick ? ", quick: crops of them" : "", bench_lens_px));
   return out;
 }
 

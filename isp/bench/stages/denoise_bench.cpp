@@ -181,21 +181,20 @@ class LightRows {
 
 std::vector<std::string> remarks_of(const Work& work) {
   std::vector<std::string> out{fmt::format(
-      "{} pictures ({}) behind a lens of {} px, RGGB, white gains 2, 1, 1.5; means over the pictures",
+      "{} images ({}) with a lens blur of {} px, RGGB, white gains 2, 1, 1.5; means over the images",
       work.pictures.size(),
-      fmt::format("{}{}", name_of(work.options.pictures), work.options.quick ? ", quick: parts of them" : ""),
+      fmt::format("{}{}", name_of(work.options.pictures), work.options.quick ? ", quick: crops of them" : ""),
       bench_lens_px)};
-  out.push_back(fmt::format(
-      "Times: CPU time of one thread, median of {} rounds in turn with memcpy; of best and {} of {} with the first "
-      "picture, of one with the others; spread: half the distance of the quartiles over the median, mean of the "
-      "pictures with several rounds; {}",
-      rounds, name_of_nl_means, slow_rounds, denoise::denoiser_target()));
-  out.push_back(fmt::format(
-      "patch_uv: distance of the means of {0} x {0} pixels from the truth in u'v', root mean square, over patches "
-      "whose "
-      "light can be known to a fifth; patch_uv_bound: the Cramer-Rao bound of it, which no unbiased method passes that "
-      "knows of a patch's pixels alone",
-      bound_patch_px));
+  out.push_back(
+      fmt::format("Times: CPU time of one thread, median of {} rounds that alternate with memcpy; for best and {} of "
+                  "{} rounds with the first image and one with each other image. Spread: half the interquartile range "
+                  "over the median, mean over the images with several rounds; {}",
+                  rounds, name_of_nl_means, slow_rounds, denoise::denoiser_target()));
+  out.push_back(
+      fmt::format("patch_uv: RMS distance in u'v' between means of {0} x {0} pixels and the truth, over patches whose "
+                  "signal can be measured to a fifth. patch_uv_bound: its Cramer-Rao bound for unbiased methods that "
+                  "use only the pixels of a patch",
+                  bound_patch_px));
   for (std::size_t i = 0; i < work.lights.size(); ++i) {
     const TunedParameters& tuned = work.tuned[i];
     std::string line = fmt::format(
@@ -204,7 +203,8 @@ std::vector<std::string> remarks_of(const Work& work) {
         tuned.stabilised_gain[1], tuned.stabilised_gain[2]);
     if (!work.strengths.empty()) {
       line += fmt::format(
-          "; opencv-nlm's strengths (lightness, colour), found on the truth (of large pictures on {} x {} of it):",
+          "; strengths of opencv-nlm (lightness, colour), optimised against the truth (of large images on a crop of {} "
+          "x {}):",
           search_columns, search_rows);
     }
     for (std::size_t p = 0; p < work.pictures.size() && !work.strengths.empty(); ++p) {
@@ -234,8 +234,7 @@ Result<std::vector<DenoiseRow>> measure_all(const Work& work, Executor& executor
     }
     for (DenoiseRow& row : of_light.finished()) rows.push_back(std::move(row));
     if (light == 0)
-      outcome.remarks.push_back("pictures denoise-LIGHT-DARK.png show, from left to right: " +
-                                names_of(of_light.parts));
+      outcome.remarks.push_back("images denoise-LIGHT-DARK.png show, from left to right: " + names_of(of_light.parts));
     add_pictures(work.lights[light], std::move(of_light.parts), outcome);
   }
   return rows;
@@ -314,7 +313,7 @@ Plot plot_of(std::span<const DenoiseRow> rows) {
   }
   plot.series.push_back(std::move(line));
   plot.name_points = true;
-  plot.caption = "No other row is faster and as good, or better and as fast: " + names;
+  plot.caption = "Pareto-optimal rows: " + names;
   return plot;
 }
 

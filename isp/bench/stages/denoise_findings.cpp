@@ -55,12 +55,13 @@ void add_against_nl_means(const Rows& rows, std::vector<Finding>& out) {
     if (ours == nullptr || theirs == nullptr) continue;
     const double gain_db = ours->error.psnr_db - theirs->error.psnr_db;
     const double share = ours->error.ciede2000 / theirs->error.ciede2000;
-    out.push_back(check(fmt::format("nlm-psnr-{}", gate.light), "standard has a higher PSNR than OpenCV's NLM",
-                        fmt::format("at least {:+.1f} dB", gate.gain_db), fmt::format("{:+.2f} dB", gain_db),
-                        gain_db >= gate.gain_db,
-                        fmt::format("{:.2f} and {:.2f} dB, its strengths found on the truth", ours->error.psnr_db,
-                                    theirs->error.psnr_db)));
-    out.push_back(check(fmt::format("nlm-ciede2000-{}", gate.light), "standard has a lower CIEDE2000 than OpenCV's NLM",
+    out.push_back(check(
+        fmt::format("nlm-psnr-{}", gate.light), "the PSNR of standard is higher than that of OpenCV's NLM",
+        fmt::format("at least {:+.1f} dB", gate.gain_db), fmt::format("{:+.2f} dB", gain_db), gain_db >= gate.gain_db,
+        fmt::format("{:.2f} and {:.2f} dB, with strengths of NLM that are optimised against the truth",
+                    ours->error.psnr_db, theirs->error.psnr_db)));
+    out.push_back(check(fmt::format("nlm-ciede2000-{}", gate.light),
+                        "the CIEDE2000 of standard is lower than that of OpenCV's NLM",
                         fmt::format("at most {:.2f} of it", gate.ciede_fraction), fmt::format("{:.3f}", share),
                         share <= gate.ciede_fraction,
                         fmt::format("{:.2f} and {:.2f}", ours->error.ciede2000, theirs->error.ciede2000)));
@@ -101,8 +102,9 @@ void add_undominated(std::span<const DenoiseRow> all, const Rows& rows, std::vec
     for (const DenoiseRow* row : rows.ours([&](const DenoiseRow& r) { return name_of(r.light) == light; })) {
       if (!row->undominated) beaten += (beaten.empty() ? "" : ", ") + row->method;
     }
-    out.push_back(check("undominated-" + light, "no row beats a level of ours in (time, CIEDE2000)", "no level beaten",
-                        beaten.empty() ? "none" : beaten, beaten.empty(), "another row is as fast and as good"));
+    out.push_back(check("undominated-" + light, "no row dominates a level of lowlux in time and CIEDE2000",
+                        "no level beaten", beaten.empty() ? "none" : beaten, beaten.empty(),
+                        "a level is dominated by another row"));
   }
 }
 
@@ -119,7 +121,7 @@ void add_speeds(const Rows& rows, std::vector<Finding>& out) {
     if (measured.empty()) continue;
     const auto [least, most] = std::minmax_element(measured.begin(), measured.end(),
                                                    [](auto* a, auto* b) { return a->speed_of_nlm < b->speed_of_nlm; });
-    out.push_back(check(fmt::format("speed-{}", gate.level), "times OpenCV's NLM's speed, in every light",
+    out.push_back(check(fmt::format("speed-{}", gate.level), "times the speed of OpenCV's NLM, at every light level",
                         fmt::format("at least {:.0f}", gate.times), fmt::format("{:.1f}", (*least)->speed_of_nlm),
                         (*least)->speed_of_nlm >= gate.times,
                         fmt::format("from {:.1f} at {} to {:.1f} at {}", (*least)->speed_of_nlm,
@@ -145,9 +147,9 @@ void add_saturation(const Rows& rows, std::vector<Finding>& out) {
     const double got = row->error.saturation_ratio;
     out.push_back(check(
         fmt::format("saturation-{}-{}", row->method, name_of(row->light)),
-        "saturation of coloured patches over the true one",
+        "saturation of coloured patches, relative to the truth",
         range.most ? fmt::format("{:g} to {:g}", range.least, *range.most) : fmt::format("at least {:g}", range.least),
-        fmt::format("{:.4f}", got), got >= range.least && (!range.most || got <= *range.most), "mean of the pictures"));
+        fmt::format("{:.4f}", got), got >= range.least && (!range.most || got <= *range.most), "mean of the images"));
   }
 }
 

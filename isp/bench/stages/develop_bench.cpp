@@ -192,13 +192,14 @@ Finding undominated_finding(std::span<const AccuracyRow> rows) {
   std::string names;
   for (const AccuracyRow* row : front) names += (names.empty() ? "" : "; ") + row->level;
   const double span = front.back()->ms_per_mp / front.front()->ms_per_mp;
-  return {"develop/undominated: " + rows.front().group,
-          "so many plans no other beats in time and error, from the fastest to the slowest of them",
-          fmt::format("at least {}, {:g} times the time", min_undominated, min_span),
-          fmt::format("{}, {:.0f} times", front.size(), span),
-          front.size() >= min_undominated && span >= min_span,
-          names,
-          Finding::Kind::check};
+  return {
+      "develop/undominated: " + rows.front().group,
+      "number of plans that are Pareto-optimal in time and error, and the ratio of the slowest to the fastest of them",
+      fmt::format("at least {}, {:g} times the time", min_undominated, min_span),
+      fmt::format("{}, {:.0f} times", front.size(), span),
+      front.size() >= min_undominated && span >= min_span,
+      names,
+      Finding::Kind::check};
 }
 
 /// Collects the results of all lights.
@@ -293,12 +294,11 @@ Result<BenchOutcome> run_develop_bench(const BenchOptions& options) {
     out.table.rows[i].emplace_back(100 * all_lights.by_one[i].spread);
   }
   out.remarks.push_back(fmt::format(
-      "{} pictures{} by a simulated camera of 14 bits, masked columns stating its dark; errors against what is "
-      "developed of the true colours of every pixel, with the same brightness and look; `no noise` is the mean of the "
-      "signal, whose error is that of demosaicing; half sizes are enlarged to be compared; megapixels are those of the "
-      "mosaic; times of the first picture, planning included; "
-      "by one thread in {} rounds",
-      pictures->size(), quick ? ", quick: parts of them," : "", rounds_by_one));
+      "{} images{} from a simulated camera of 14 bits with masked columns. The reference is developed from the true "
+      "colours of every pixel with the same brightness and look. `no noise` is the mean of the signal, whose error is "
+      "that of demosaicing. Half sizes are enlarged for the comparison. Megapixels are those of the mosaic. Times are "
+      "those of the first image with planning, by one thread in {} rounds",
+      pictures->size(), quick ? ", quick: crops of them," : "", rounds_by_one));
   return out;
 }
 

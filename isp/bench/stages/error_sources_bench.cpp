@@ -158,13 +158,13 @@ Result<BenchOutcome> run_error_sources_bench(const BenchOptions& options) {
     options.advance(1 / static_cast<double>(lights.size()), "sources of error at " + light.name);
   }
   out.remarks.push_back(
-      fmt::format("{} pictures{} by the camera of the stage `develop`; errors of 8-bit sRGB codes against the true "
+      fmt::format("{} images{} by the camera of the stage `develop`; errors of 8-bit sRGB codes against the true "
                   "colours of every pixel, developed to 16 bits with the same brightness and look",
-                  pictures->size(), options.quick ? ", quick: parts of them," : ""));
+                  pictures->size(), options.quick ? ", quick: crops of them," : ""));
   out.remarks.emplace_back(
-      "percentages add up to 100: black is the decrease of the error with the true black level instead of the "
-      "measured one, noise the further decrease without noise, its reduction and repairs, demosaicing the further "
-      "decrease with the true colours of every pixel, and rendering what remains: rounding to 8 bits");
+      "percentages add up to 100. Black is the decrease of the error with the true black level instead of the measured "
+      "one; noise is the further decrease without noise, noise reduction and repairs; demosaicing is the further "
+      "decrease with the true colours of every pixel; rendering is the remaining error of rounding to 8 bits");
   return out;
 }
 

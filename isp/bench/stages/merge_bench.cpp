@@ -387,14 +387,14 @@ Result<BenchOutcome> run_merge_bench(const BenchOptions& options) {
   }
   out.plots = {gain_over_frames(out.table)};
   out.remarks = {
-      fmt::format("bursts of a camera with 2 e- of read noise; pictures behind a lens, reduced to half; hand-held: "
-                  "shifts up to 40 px, rotation up to 1.5 degrees; {} px at the border are not judged",
+      fmt::format("bursts of a camera with 2 e- of read noise; images with a lens blur, reduced to half size; "
+                  "hand-held: shifts of up to 40 px, rotation of up to 1.5 degrees; a border of {} px is not scored",
                   border_px),
-      fmt::format("stated variance / error: of a pixel, where nothing moved; of the means of R, G and B over areas of "
-                  "{0} x {0} px, which is what noise reduction has to know",
+      fmt::format("stated variance / error: for single pixels where nothing moved, and for means of R, G and B over "
+                  "areas of {0} x {0} px, on which noise reduction is based",
                   area_px),
-      "gain: error of one raw frame over that of the merged one, against the truth of frame 0; developed: by the level "
-      "that develop chooses, PSNR of sRGB codes and mean CIEDE2000 against the scene"};
+      "gain: error of one raw frame over that of the merged frame, both against the truth of frame 0; developed: with "
+      "the level that develop chooses, PSNR of sRGB codes and mean CIEDE2000 against the scene"};
   return out;
 }
 

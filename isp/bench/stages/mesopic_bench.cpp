@@ -317,9 +317,9 @@ Result<BenchOutcome> run_mesopic_bench(const BenchOptions& options) {
   }
   BenchOutcome out = accuracy_outcome("mesopic", rows, timing, 1);
   out.remarks.push_back(fmt::format(
-      "{} colours of the middle {} x {} of {} pictures. States are those of an eye adapted to the colour itself, one "
-      "for "
-      "each cell of 16 pixels, CIE 191 solved or looked up; what is compared is the colour that is shown, without blur",
+      "{} colours of the central {} x {} pixels of {} images. The eye is adapted to the colour itself, with one state "
+      "for each cell of 16 pixels, by CIE 191 solved or looked up in a table. The displayed colours are compared, "
+      "without blur",
       colours.size(), pictures->front().linear.width(), pictures->front().linear.height(), pictures->size()));
   out.remarks.insert(out.remarks.end(), remarks.begin(), remarks.end());
   return out;

@@ -249,14 +249,13 @@ BenchOutcome methods_outcome(std::span<const MethodRow> rows, std::vector<Method
   BenchOutcome out{.table = methods_table(rows), .plots = plots_of(rows)};
   add_parts(std::move(parts), out);
   out.remarks = {
-      "Every method is given the same raw frames, alone in a private folder; the truth stays in the memory of lowlux",
+      "Every method gets the same raw frames, each in a private folder; the truth is not written to a file",
       "Rows are means over the scenes. The rank is that of PSNR; noise-free is the mosaic without noise, noisy the "
       "input. Raw output is rendered as that of lowlux; an image is scaled to the mean luminance of the truth first",
-      "saturation, texture and stars kept are slopes against the truth: 1 is all of it. chroma bias is the length of "
-      "the "
-      "mean difference in a*, b*; blotches are the RMS difference in a*, b* of means over 16 x 16 pixels",
-      "Times are by the wall clock, one run for each frame: a program's includes its start and reading and writing "
-      "files; a function's does not. Peak memory is that of the largest process of a program"};
+      "saturation, texture and stars kept are slopes of a regression on the truth; 1 is ideal. chroma bias is the "
+      "length of the mean difference in a*, b*; blotches are the RMS difference in a*, b* of means over 16 x 16 pixels",
+      "Times are wall-clock times of one run for each frame; those of programs include their start and file access, "
+      "those of functions do not. Peak memory is that of the largest process of a program"};
   return out;
 }
 
@@ -287,7 +286,7 @@ Result<BenchOutcome> run_methods_bench(const BenchOptions& options) {
   std::vector<DenoiseLight> lights = methods_lights(options.quick);
   if (options.shard.number > lights.size()) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("shard {} of {} is empty: the number of lights is {}", options.shard.number,
+                fmt::format("shard {} of {} is empty: there are {} light levels", options.shard.number,
                             options.shard.count, lights.size()),
                 "--shard");
   }

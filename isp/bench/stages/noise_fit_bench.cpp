@@ -104,7 +104,8 @@ void add(FitErrors& errors, const calib::PhotonTransfer& found, const SensorMode
 /// n)).
 Finding told_finding(const std::string& id, const FitErrors& errors) {
   const double ratio = errors.gain() / errors.told(), allowed = confidence_errors * std::sqrt(0.5 / errors.fits);
-  return check_of("noise-fit/" + id, "the gain's error is the standard error that the fit tells, to five of its own",
+  return check_of("noise-fit/" + id,
+                  "the error of the gain equals the standard error of the fit, within five of its own standard errors",
                   fmt::format("1 +- {:.2g}", allowed), fmt::format("{:.3g}", ratio), std::fabs(ratio - 1) <= allowed);
 }
 
@@ -212,7 +213,7 @@ Result<void> measure_pictures(const std::vector<BenchPicture>& pictures, const B
   if (!taken) return tl::make_unexpected(taken.error());
   const auto shots = std::make_shared<const std::vector<NoisyPicture>>(*std::move(taken));
   const double lightless_e = lightless_noise_e(bench_camera().model, light.exposure());
-  AccuracyGroup group{fmt::format("one picture, {}", light.name), gain_error, {}};
+  AccuracyGroup group{fmt::format("one image, {}", light.name), gain_error, {}};
   const std::vector<PictureWay> ways = picture_ways(options.quick);
   std::vector<std::vector<double>> figures;
   figures.reserve(ways.size());
@@ -240,7 +241,7 @@ Result<BenchOutcome> run_noise_fit_bench(const BenchOptions& options) {
   const auto pictures =
       options.quick ? read_bench_pictures(options, 448, 320, 1, one) : read_bench_pictures(options, 768, 512, 0, one);
   if (!pictures) return tl::make_unexpected(pictures.error());
-  StageRows rows{.further = {"error of the dark noise", "standard error told of the gain", "refused", "measured"}};
+  StageRows rows{.further = {"error of the dark noise", "stated standard error of the gain", "refused", "measured"}};
   std::vector<Finding> findings;
   std::vector<std::string> left_out;
   if (const auto done = measure_flats(options, rows, findings); !done) return tl::make_unexpected(done.error());
@@ -252,19 +253,17 @@ Result<BenchOutcome> run_noise_fit_bench(const BenchOptions& options) {
   }
   BenchOutcome out = outcome_of("noise-fit", rows, TimeOf::whole);
   out.findings = std::move(findings);
-  out.remarks = {
-      fmt::format("The truth is the simulated sensor's: {}; errors are relative, root mean squares of so many "
-                  "measurements, and those of the dark noise are of all temporal noise without light",
-                  bench_camera().model.name),
-      fmt::format("Photon transfer: pairs of flats at each of {} levels of light up to {:g} of full well, and darks; "
-                  "each measurement has new "
-                  "noise and a new specimen of the sensor",
-                  fractions_of_full.size(), fractions_of_full.back()),
-      fmt::format("One picture: {} ones, {} frames of each; texture finer than the details raises the gain, which a "
-                  "standard error does not tell; the time is that of the first",
-                  name_of(options.pictures), options.quick ? 1 : 3),
-      "Times are of one whole measurement, frames in memory; memcpy is that of a megapixel of floats",
-      timing_remark(timing_of(options), 1)};
+  out.remarks = {fmt::format("The truth is that of the simulated sensor: {}. Errors are relative RMS errors over this "
+                             "number of measurements; dark noise is all temporal noise without light",
+                             bench_camera().model.name),
+                 fmt::format("Photon transfer: pairs of flats at {} light levels up to {:g} of full well, and darks; "
+                             "each measurement has new noise and a new fixed pattern",
+                             fractions_of_full.size(), fractions_of_full.back()),
+                 fmt::format("One image: {} images, {} frames of each; very fine texture increases the gain, which the "
+                             "standard error does not include; the time is that of the first image",
+                             name_of(options.pictures), options.quick ? 1 : 3),
+                 "Times are those of one measurement on frames in memory; memcpy copies a megapixel of floats",
+                 timing_remark(timing_of(options), 1)};
   std::ranges::move(left_out, std::back_inserter(out.remarks));
   return out;
 }

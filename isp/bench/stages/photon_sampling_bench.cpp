@@ -72,7 +72,7 @@ class PhotonLight {
     variance_errors_ = {variance_of_law(exact) / mean_e_ - 1, variance_of_law(normal) / mean_e_ - 1};
     const double megapixels = 1e-6 * width * size_.height;
     return {fmt::format("{:g} e-", mean_e_),
-            "largest difference to Poisson's distribution function",
+            "largest difference to the distribution function of Poisson",
             {{"poisson_row", kolmogorov_distance(exact, law_), [this] { draw_poisson(); }, megapixels},
              {"rounded normal", kolmogorov_distance(normal, law_), [this] { draw_normal(); }, megapixels},
              {"std::poisson", kolmogorov_distance(standard_sample(), law_), [this] { draw_standard(); }, megapixels},
@@ -132,12 +132,12 @@ void add_findings(const std::string& light, std::span<const AccuracyRow> rows, c
     return std::ranges::find(rows, level, &AccuracyRow::level)->error;
   };
   const double ours = error_of("poisson_row"), standard = error_of("std::poisson");
-  out.findings.push_back(
-      check_of(fmt::format("photon-sampling/exact-{}", light), "poisson_row has Poisson's law to a word in 2^32",
-               fmt::format("< {:.3g}", exact_bound), fmt::format("{:.3g}", ours), ours < exact_bound));
+  out.findings.push_back(check_of(
+      fmt::format("photon-sampling/exact-{}", light), "poisson_row has the Poisson distribution to within 2^-32",
+      fmt::format("< {:.3g}", exact_bound), fmt::format("{:.3g}", ours), ours < exact_bound));
   const double limit = kolmogorov_limit(size.samples);
   out.findings.push_back(check_of(fmt::format("photon-sampling/std-{}", light),
-                                  "a sample of std::poisson_distribution has the law that was computed",
+                                  "a sample of std::poisson_distribution agrees with the computed distribution",
                                   fmt::format("< {:.3g}", limit), fmt::format("{:.3g}", standard), standard < limit));
 }
 
@@ -164,10 +164,10 @@ Result<BenchOutcome> run_photon_sampling_bench(const BenchOptions& options) {
   BenchOutcome out = outcome_of("photon-sampling", rows, TimeOf::megapixel);
   out.findings = std::move(found.findings);
   out.remarks = {
-      "The reference is Poisson's law, summed in double; the laws of poisson_row and of the rounded normal are counted "
-      "over all 2^32 words, so that nothing of them is sampled",
-      fmt::format("std::poisson is a sample of {} counts of std::poisson_distribution: of an exact law its difference "
-                  "is {:.2g} on the average or less; the error of its variance is 0 by definition",
+      "The reference is the Poisson distribution, summed in double precision. The distributions of poisson_row and of "
+      "the rounded normal are exact counts over all 2^32 random words",
+      fmt::format("std::poisson is a sample of {} counts of std::poisson_distribution; a sample of an exact "
+                  "distribution differs by {:.2g} or less on average. The error of its variance is 0 by definition",
                   size.samples, 0.8687 / std::sqrt(static_cast<double>(size.samples))),
       fmt::format(
           "published draws photons by wavelength (D65, {}) and has fractions of electrons: a sample of {} green "

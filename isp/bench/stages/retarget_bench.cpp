@@ -129,9 +129,9 @@ Result<BenchOutcome> run_retarget_bench(const BenchOptions& options) {
     options.advance(1 / static_cast<double>(methods.size()), "retargeting: " + std::string(name_of(method)));
   }
   BenchOutcome out = accuracy_outcome("retarget", rows, timing, 1);
-  out.remarks.push_back(fmt::format(
-      "{} colours spread over all {} pictures{}, sRGB codes of 16 bits; CIEDE2000 of codes as sRGB under D65",
-      work.exact.size(), pictures->size(), quick ? ", quick: of their middle 96 x 96 pixels" : ""));
+  out.remarks.push_back(
+      fmt::format("{} colours from all {} images{}, sRGB codes of 16 bits; CIEDE2000 of codes as sRGB under D65",
+                  work.exact.size(), pictures->size(), quick ? ", quick: of the central 96 x 96 pixels" : ""));
   out.remarks.insert(out.remarks.end(), remarks.begin(), remarks.end());
   return out;
 }

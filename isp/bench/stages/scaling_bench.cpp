@@ -261,7 +261,7 @@ std::vector<ScalingRow> rows_over_size(const RawFrame& small, const BenchOptions
   for (const double megapixels : sizes) {
     options.advance(1 / static_cast<double>(sizes.size() + 1), fmt::format("frames of {:g} MP", megapixels));
     if (1e6 * megapixels * max_bytes_per_pixel > memory_fraction * physical_bytes()) {
-      left_out += fmt::format("; {:g} MP left out, for want of memory", megapixels);
+      left_out += fmt::format("; {:g} MP not measured, because memory is too small", megapixels);
       continue;
     }
     const int of_size = megapixels < rounds.few_from_mp ? rounds.usual : rounds.few;
@@ -306,15 +306,16 @@ Result<BenchOutcome> run_scaling_bench(const BenchOptions& options) {
   BenchOutcome out{.table = table_of(rows)};
   out.plots = {plot_over_size(rows, "scaling-time", "time [ms/MP]", &ScalingRow::ms_per_mp),
                plot_over_size(rows, "scaling-memory", "peak memory [bytes/pixel]", &ScalingRow::peak_bytes_per_pixel)};
-  out.remarks.push_back(
-      timing_remark({.rounds = rounds.usual, .wall_clock = true}, options.threads) +
-      fmt::format("; from {:g} MP on {}; threads as in their column{}", rounds.few_from_mp, rounds.few, left_out));
+  out.remarks.push_back(timing_remark({.rounds = rounds.usual, .wall_clock = true}, options.threads) +
+                        fmt::format("; from {:g} MP on {}; the number of threads is in its column{}",
+                                    rounds.few_from_mp, rounds.few, left_out));
   out.remarks.emplace_back(
-      "frames are one of 20 e- repeated, planned and developed anew each time; peak memory is what a child process "
-      "with "
-      "one thread adds to its largest resident set, beyond the frame's 2 bytes for each pixel");
-  out.remarks.push_back(fmt::format(
-      "{} files: DNGs are read, developed and written as PNG, so many jobs at a time, which share the threads", files));
+      "frames repeat one frame of 20 e- and are planned and developed each time; peak memory is the increase of the "
+      "largest resident set of a child process with one thread, without the 2 bytes per pixel of the frame");
+  out.remarks.push_back(
+      fmt::format("{} files: DNGs are read, developed and written as PNG by this number of jobs in parallel, which "
+                  "share the threads",
+                  files));
   options.advance(1.0 / (options.quick ? quick_sizes + 1 : sizes_mp.size() + 1), "several files");
   return out;
 }

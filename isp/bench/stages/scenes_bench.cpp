@@ -149,7 +149,7 @@ std::vector<Finding> gain_findings(const StageRows& rows) {
     if (!std::ranges::any_of(denoise::all_levels, is_level)) continue;
     least_db = is_level(denoise::all_levels.front()) ? psnr_db : std::min(least_db, psnr_db);
     if (!is_level(denoise::all_levels.back())) continue;
-    out.push_back(check_of("scenes/gain/" + row.group, "PSNR of the worst level over none",
+    out.push_back(check_of("scenes/gain/" + row.group, "PSNR of the worst level minus PSNR without noise reduction",
                            fmt::format("at least {:+.1f} dB", -tolerance_db),
                            fmt::format("{:+.2f} dB", least_db - none_db), least_db - none_db >= -tolerance_db));
   }
@@ -195,8 +195,7 @@ Result<BenchOutcome> run_scenes_bench(const BenchOptions& options) {
   std::ranges::move(marks_findings(options, size, developer), std::back_inserter(out.findings));
   out.remarks.push_back(fmt::format(
       "generated scenes of {} x {} px, {} seeds, RGGB, white gains 2, 1, 1.5, 2 e- of dark charge, 1.5 e- of read "
-      "noise; lamps and stars saturate at white; times are of noise reduction and demosaicing together; marks at {:g} "
-      "e-",
+      "noise; lamps and stars saturate at white; times include noise reduction and demosaicing; artefacts at {:g} e-",
       size.width, size.height, name_of(options.pictures), marks_mean_e));
   return out;
 }

@@ -171,16 +171,18 @@ Result<BenchOutcome> run_simulate_bench(const BenchOptions& options) {
   BenchOutcome out = outcome_of("simulate", rows, TimeOf::megapixel);
   const AccuracyTiming timing{.rounds = options.quick ? 3 : 5};
   const std::string noise_of_frames =
-      "All but another frame share their random numbers with the reference, published all but the photons': what "
-      "another frame differs by is noise alone; the variance of noise is half the mean square of the difference of "
-      "two frames";
+      "All files except `another frame` have the random numbers of the reference (`published` except those of "
+      "photons), so `another frame` differs by noise only. The variance of noise is half the mean square of the "
+      "difference of two frames";
   out.remarks = {
-      fmt::format("{} pictures ({}); the reference is the file of physical photons with all effects; codes go back to "
-                  "charge by a file's black and white level, boxes of {} px are developed as the planner does it",
-                  pictures->size(), name_of(options.pictures), box_px),
+      fmt::format(
+          "{} images ({}); the reference is the file of physical photons with all noise sources. Codes are converted "
+          "to charge by the black and the white level of the file; blocks of {} px are developed as by the planner",
+          pictures->size(), name_of(options.pictures), box_px),
       noise_of_frames,
-      "published goes without auto, which plans for physical photons alone; none leaves no photon to sample",
-      "Times are of a frame's codes, the scene being exposed and planned already",
+      "`published` is not combined with `auto`, which plans for physical photons only, nor with `none`, which has no "
+      "photon noise",
+      "Times are those of the codes of a frame, without exposing the scene and planning",
       timing_remark(timing, 1),
       "Times of several threads are wall clock"};
   return out;

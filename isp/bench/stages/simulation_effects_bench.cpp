@@ -199,13 +199,13 @@ class EffectsLight {
 
   Finding promise_finding(const Closest& closest) const {
     return check_of("simulation-effects/promise-" + id_of(light_),
-                    "the planner keeps its tolerances in every block: share of them that is used", "< 1",
+                    "the planner keeps its tolerances in every block: largest fraction of them that is used", "< 1",
                     closest.text(), closest.share < 1);
   }
   Finding bound_finding(const Closest& closest) const {
     return check_of("simulation-effects/bound-" + id_of(light_),
-                    "no block changes by more than was predicted: share of it that is seen", "<= 1", closest.text(),
-                    closest.share <= 1);
+                    "no block changes by more than predicted: largest ratio of actual to predicted change", "<= 1",
+                    closest.text(), closest.share <= 1);
   }
 
   BenchLight light_;
@@ -241,13 +241,13 @@ Result<BenchOutcome> run_simulation_effects_bench(const BenchOptions& options) {
   out.images = std::move(images);
   out.remarks = {
       fmt::format(
-          "{} pictures ({}); the reference is the frame with all effects, of the same random numbers; figures are "
-          "the largest over blocks of {} px: CIEDE2000 of their means and relative variance of R, G or B",
+          "{} images ({}); the reference is the frame with all noise sources and the same random numbers. Figures are "
+          "the largest over blocks of {} px: CIEDE2000 of their means, and relative variance of R, G or B",
           pictures->size(), name_of(options.pictures), effect_block),
-      "Plans are made beforehand; times are of reading out one frame as floats; auto DE,VARIANCE is the planner at "
+      "Times are those of reading out one frame as floats, without planning; auto DE,VARIANCE is the planner with "
       "these tolerances",
-      "Images show, from left to right: all effects, auto at each tolerance, none; 2 x 2 pixels are one, the brightest "
-      "pixel is white",
+      "Images show, from left to right: all noise sources, auto at each tolerance, none; they are binned 2 x 2, and "
+      "white is the brightest pixel",
       timing_remark(timing, 1)};
   return out;
 }

@@ -31,7 +31,8 @@ Result<AppearanceModel> appearance_model_named(std::string_view name) {
     known += model.name;
   }
   return fail(ErrorCode::invalid_argument,
-              "there is no model of appearance \"" + std::string(name) + "\"; there are " + known, std::string(name));
+              "unknown model of colour appearance \"" + std::string(name) + "\"; there are " + known,
+              std::string(name));
 }
 
 }  // namespace lowlux::isp

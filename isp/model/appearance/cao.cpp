@@ -75,8 +75,8 @@ AppearanceModel cao_appearance() {
           .source = "Cao, Pokorny, Smith & Zele 2008",
           .needs = "luminance of adaptation",
           .limits =
-              "adds the rods' light to the cones', so that white gets up to a third brighter; colours leave the gamut; "
-              "the scale of the rods is a choice, and nothing below 0.1 cd/m2 was measured",
+              "adds the signal of the rods to that of the cones, so white becomes up to a third brighter and some "
+              "colours leave the gamut; the scale of the rods is our choice; there are no measurements below 0.1 cd/m2",
           .valid_from_cd_m2 = 0.5,
           .valid_to_cd_m2 = 1e5,
           .at = cao_map};

@@ -105,7 +105,7 @@ Result<EntropyModel> entropy_model(double m, const NodePower& white, const Entro
                 "the weight of entropy must be 1e-12 or more, found " + number_text(model.gamma));
   }
   if (!(sum_of(white) > 0) || !std::isfinite(sum_of(white))) {
-    return fail(ErrorCode::invalid_argument, "the white needs power between 390 and 730 nm to compare colours with");
+    return fail(ErrorCode::invalid_argument, "the white must have power between 390 and 730 nm");
   }
   if (options.noise_covariance) {
     if (const auto checked = check_covariance(*options.noise_covariance); !checked) {
@@ -326,7 +326,8 @@ AppearanceModel entropy_appearance() {
   return {.name = "entropy",
           .source = "Clark & Skaff 2009, with rods",
           .needs = "luminance and S/P of the adaptation field; the noise of each pixel if it is known",
-          .limits = "spectra are the smoothest of their colours; no lightness beyond mesopic luminance, no acuity",
+          .limits =
+              "uses the smoothest spectrum of each colour; models mesopic luminance, but neither lightness nor acuity",
           .valid_from_cd_m2 = 0.025,  // five times the adaptation fields of CIE 191, 0.005 to 5 cd/m2
           .valid_to_cd_m2 = 25,
           .uses_noise = true,

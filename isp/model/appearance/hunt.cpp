@@ -67,7 +67,7 @@ AppearanceModel hunt_appearance() {
   return {.name = "hunt",
           .source = "Hunt 1994",
           .needs = "luminance of adaptation; the colour temperature of the light improves it",
-          .limits = "lightness alone, chromaticities are kept: colours do not fade",
+          .limits = "models lightness only: chromaticities do not change, so colours do not fade",
           .valid_from_cd_m2 = 1e-3,
           .valid_to_cd_m2 = 1e5,
           .at = hunt_map};

@@ -114,8 +114,8 @@ Result<ColourMap> icam06_map(const ViewingConditions& conditions) {
 AppearanceModel icam06_appearance() {
   return {.name = "icam06",
           .source = "Kuang, Johnson & Fairchild 2007",
-          .needs = "luminance of the white; its local contrast needs the picture and is left out",
-          .limits = "compresses tones, which darkens; rods add grey, so that colours fade but never turn blue",
+          .needs = "luminance of the white; the local contrast of the model needs the whole image and is not applied",
+          .limits = "compresses tones, which darkens the image; rods add grey, so colours fade but do not turn blue",
           .valid_from_cd_m2 = 1e-3,
           .valid_to_cd_m2 = 1e5,
           .at = icam06_map};

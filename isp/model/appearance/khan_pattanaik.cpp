@@ -66,7 +66,8 @@ AppearanceModel khan_pattanaik_appearance() {
           .source = "Khan & Pattanaik 2004",
           .needs = "luminance of the scene",
           .limits =
-              "made for moonlight; mixed with daylight by CIE 191, and with its luminance, which the paper leaves open",
+              "made for moonlight; the mixture with daylight and the luminance follow CIE 191, because the paper does "
+              "not define them",
           .valid_from_cd_m2 = 1e-3,
           .valid_to_cd_m2 = 0.3,
           .at = khan_pattanaik_map};

@@ -112,22 +112,23 @@ AppearanceModel kirk_obrien_appearance() {
           .source = "Kirk & O'Brien 2011",
           .needs = "luminance of the scene and of adaptation",
           .limits =
-              "a shift of hue alone, colours do not fade; with the constants as handed down white turns to a cyan "
-              "outside of all colours: filament is the form that serves; towards daylight the shift goes with the "
-              "root of luminance only",
+              "shifts hue only, colours do not fade; with the constants as published white becomes a cyan outside the "
+              "spectral locus, so use filament instead; towards daylight the shift decreases only with the square root "
+              "of luminance",
           .valid_from_cd_m2 = 0.01,
           .valid_to_cd_m2 = 10,
           .at = kirk_obrien_map};
 }
 
 AppearanceModel filament_appearance() {
-  return {.name = "filament",
-          .source = "Kirk & O'Brien 2011 as in google/filament",
-          .needs = "luminance of the scene",
-          .limits = "as kirk_obrien; made for exposed pictures, its scale in cd/m2 is known to a factor of eight",
-          .valid_from_cd_m2 = 0.01,
-          .valid_to_cd_m2 = 10,
-          .at = filament_map};
+  return {
+      .name = "filament",
+      .source = "Kirk & O'Brien 2011 as in google/filament",
+      .needs = "luminance of the scene",
+      .limits = "like kirk_obrien; made for exposed images, so its scale in cd/m2 is uncertain by a factor of eight",
+      .valid_from_cd_m2 = 0.01,
+      .valid_to_cd_m2 = 10,
+      .at = filament_map};
 }
 
 }  // namespace lowlux::isp

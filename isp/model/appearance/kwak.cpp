@@ -41,7 +41,9 @@ AppearanceModel kwak_appearance() {
   return {.name = "kwak",
           .source = "Kwak, MacDonald & Luo 2003",
           .needs = "luminance of adaptation; the colour temperature of the light improves it",
-          .limits = "lightness alone, chromaticities are kept; the weight of the rods is not published and taken as 1",
+          .limits =
+              "models lightness only: chromaticities do not change; the weight of the rods is not published and "
+              "assumed to be 1",
           .valid_from_cd_m2 = 0.1,
           .valid_to_cd_m2 = 1e4,
           .at = kwak_map};

@@ -74,8 +74,8 @@ AppearanceModel mikamo_appearance() {
           .source = "Mikamo, Slomp, Raytchev, Tamaki & Kaneda 2014",
           .needs = "retinal illuminance",
           .limits =
-              "transcribed at second hand, with an adaptation to the white that is not theirs; spectra are guessed "
-              "from three colours, and saturated ones leave the gamut",
+              "implemented from a secondary source, with our adaptation to the white; spectra are estimated from three "
+              "channels, and saturated colours leave the gamut",
           .valid_from_cd_m2 = 0.05,
           .valid_to_cd_m2 = 50,
           .at = mikamo_map};

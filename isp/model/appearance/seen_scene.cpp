@@ -50,7 +50,7 @@ Result<SeenScene> seen_scene(const ViewingConditions& conditions) {
   const auto to_d65 = xy && excites_all_cones(white) ? bradford_adaptation(*xy, white_d65) : std::nullopt;
   if (!to_d65) {
     return fail(ErrorCode::invalid_argument,
-                "the white is not a valid colour of a light: it must excite all cones and the rods; found XYZ " +
+                "the white is not the colour of a light: it must excite all cones and the rods; found XYZ " +
                     number_text(w.x) + " " + number_text(w.y) + " " + number_text(w.z));
   }
   SeenScene scene;

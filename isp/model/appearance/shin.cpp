@@ -140,14 +140,15 @@ Result<ColourMap> shin_map(const ViewingConditions& conditions) {
 }  // namespace
 
 AppearanceModel shin_appearance() {
-  return {
-      .name = "shin",
-      .source = "Shin, Matsuki, Yaguchi & Shioiri 2004",
-      .needs = "illuminance of the scene; a table of six coefficients",
-      .limits = "without the authors' table of coefficients it runs on SHIN-SUB-1, which is fitted to their abstract",
-      .valid_from_cd_m2 = 0.003,
-      .valid_to_cd_m2 = 286,
-      .at = shin_map};
+  return {.name = "shin",
+          .source = "Shin, Matsuki, Yaguchi & Shioiri 2004",
+          .needs = "illuminance of the scene; a table of six coefficients",
+          .limits =
+              "the coefficients of the authors are not published; SHIN-SUB-1, which is fitted to their abstract, is "
+              "used instead",
+          .valid_from_cd_m2 = 0.003,
+          .valid_to_cd_m2 = 286,
+          .at = shin_map};
 }
 
 }  // namespace lowlux::isp

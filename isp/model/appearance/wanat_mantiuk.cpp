@@ -60,7 +60,7 @@ AppearanceModel wanat_mantiuk_appearance() {
   return {.name = "wanat_mantiuk",
           .source = "Wanat & Mantiuk 2014",
           .needs = "mean luminance of the scene",
-          .limits = "saturation alone: no rods, no shift of hue, luminance is kept",
+          .limits = "models saturation only: no rods and no shift of hue; luminance does not change",
           .valid_from_cd_m2 = 0.05,
           .valid_to_cd_m2 = 1000,
           .at = wanat_mantiuk_map};
