@@ -130,7 +130,7 @@ Result<void> look(const ChartPicture& picture, const CameraRgb& small, int shrin
   const std::vector<std::uint8_t> codes = codes_of(small, gain);
   std::array<ChartShape, max_shapes> shapes;
   const int count = detect({codes.data(), small.width(), small.height()}, shapes.data(), max_shapes);
-  if (count < 0) return fail(ErrorCode::unreadable, "OpenCV's chart detector failed on the picture");
+  if (count < 0) return fail(ErrorCode::unreadable, "OpenCV's chart detector failed on the image");
   for (int i = 0; i < count; ++i) {
     // The detector's model has patches of 2.5 that are 0.25 apart, in a border of 0.25: cells of 2.75 that end 0.125
     // inside its box.
@@ -155,23 +155,21 @@ Error none_found(const Search& search) {
       clipped += patch.clipped_fraction > max_clipped_fraction ? 1 : 0;
     }
     return {ErrorCode::insufficient,
-            fmt::format("what may be a chart has {} of 24 patches that can be measured, and {} are needed: {} are "
-                        "clipped; {}",
+            fmt::format("{} of the 24 patches of the probable chart can be measured, {} are needed: {} are clipped; {}",
                         measurable(*search.unusable), min_patches, clipped,
-                        clipped > 0 ? "expose shorter" : "the chart must be larger in the picture"),
+                        clipped > 0 ? "expose shorter" : "the chart must be larger in the image"),
             {}};
   }
   const std::string seen =
-      search.shapes == 0 ? std::string("no grid of 6 x 4 patches was seen")
+      search.shapes == 0 ? std::string("no grid of 6 x 4 patches was found")
       : std::isfinite(search.nearest)
           ? fmt::format(
-                "the colours of what was most like one are {:.0f} CIEDE2000 from a ColorChecker's, and {:g} "
-                "would do",
+                "the most similar grid differs from a ColorChecker by {:.0f} CIEDE2000, more than the limit of {:g}",
                 search.nearest, worst_chart_ciede2000)
-          : std::string("the colours of what was most like one cannot be a ColorChecker's");
+          : std::string("the colours of the most similar grid cannot be those of a ColorChecker");
   return {ErrorCode::insufficient,
-          fmt::format("no chart found: {}; a ColorChecker Classic must be in the picture whole, its patches 15 pixels "
-                      "or more at half size",
+          fmt::format("no chart found: {}; the image must show a complete ColorChecker Classic, with patches of at "
+                      "least 15 pixels at half size",
                       seen),
           {}};
 }
@@ -185,14 +183,14 @@ Result<FoundChart> chosen(const Search& search) {
       places += fmt::format("{}({:.0f}, {:.0f})", places.empty() ? "" : ", ", 2 * middle.x, 2 * middle.y);
     }
     return fail(ErrorCode::insufficient,
-                fmt::format("{} charts found, at {}: cover all but one", search.charts.size(), places));
+                fmt::format("{} charts were found, at {}: the image must show only one", search.charts.size(), places));
   }
   const FoundChart& chart = search.charts.front();
   const double error = relative_error(chart.patches);
   if (!(error <= worst_relative_error)) {
     return fail(ErrorCode::insufficient,
-                fmt::format("the chart is too dark: its median patch is known to {:.1f} %, and {:g} % are needed; "
-                            "expose longer, or have the chart larger in the picture",
+                fmt::format("the chart is too dark: the standard error of its median patch is {:.1f} %, at most {:g} % "
+                            "are allowed; expose longer, or take a larger image of the chart",
                             100 * error, 100 * worst_relative_error));
   }
   return chart;

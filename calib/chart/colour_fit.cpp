@@ -98,8 +98,8 @@ Result<void> check(const ColourFit& fit) {
   const double fall = std::fabs(fit.light.per_x) + std::fabs(fit.light.per_y);
   if (!(fall < 1)) {
     return fail(ErrorCode::insufficient,
-                fmt::format("the light would change by {:.0f} % from the chart's middle to its corner, and at most "
-                            "100 % can be: light the chart evenly",
+                fmt::format("the fitted light changes by {:.0f} % from the middle of the chart to its corner, at most "
+                            "100 % are plausible: light the chart evenly",
                             100 * fall));
   }
   return {};
@@ -197,10 +197,9 @@ Result<ColourFit> fit_colour(std::span<const ColourSample> samples, const Colour
   const Unknowns unknowns = unknowns_of(options);
   Solution solution = least_squares(unknowns, samples);
   if (!(solution.condition_number <= worst_colour_condition)) {
-    return fail(ErrorCode::insufficient,
-                fmt::format("the patches do not separate the three channels: the equations' condition number is "
-                            "{:.3g}, and at most {:g} can be solved",
-                            solution.condition_number, worst_colour_condition));
+    return fail(ErrorCode::insufficient, fmt::format("the patches do not separate the three channels: the condition "
+                                                     "number of the equations is {:.3g}, at most {:g} is allowed",
+                                                     solution.condition_number, worst_colour_condition));
   }
   if (options.minimise_ciede2000) {
     solution.theta = minimise_ciede2000(unknowns, std::move(solution.theta), samples, options.white);
@@ -258,7 +257,8 @@ Result<ColourFit> scaled_to_chart(const Matrix3& camera_to_xyz, std::span<const 
   ColourFit out{solution.theta[0] * camera_to_xyz, {}, solution.condition_number};
   if (options.uneven_light) out.light = {solution.theta[1], solution.theta[2]};
   if (!(solution.theta[0] > 0)) {
-    return fail(ErrorCode::insufficient, "the matrix gives the chart's patches no positive luminance");
+    return fail(ErrorCode::insufficient,
+                "the fitted matrix does not give the patches of the chart positive luminances");
   }
   if (auto good = check(out); !good) return tl::make_unexpected(good.error());
   return out;
@@ -273,7 +273,7 @@ Result<ColourCalibration> calibration_of(const ColourFit& fit, const isp::Xyz& w
   const double largest = *std::max_element(neutral.begin(), neutral.end());
   if (!temperature || !to_d50 || !(*std::min_element(neutral.begin(), neutral.end()) > 0)) {
     return fail(ErrorCode::insufficient,
-                "the fitted matrix makes a channel of white dark: is it the right illuminant?");
+                "by the fitted matrix a channel of white is not positive: is --illuminant right?");
   }
   ColourCalibration out;
   out.cct_k = temperature->cct_k;

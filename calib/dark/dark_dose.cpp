@@ -91,14 +91,14 @@ void warn_of_temperatures(std::span<const DarkLevel> levels, const DarkExposure&
   for (const DarkLevel& level : levels) {
     if (!level.exposure.temperature_c || !picture.temperature_c) {
       out.warnings.emplace_back(
-          "picture or darks do not state their temperature: the darks are taken to be as warm as the picture");
+          "the image or the darks do not state their temperature: equal temperatures are assumed");
       return;
     }
     low = std::min(low, *level.exposure.temperature_c);
     high = std::max(high, *level.exposure.temperature_c);
   }
   if (*picture.temperature_c < low - same_temperature_c || *picture.temperature_c > high + same_temperature_c) {
-    out.warnings.push_back(fmt::format("the picture was taken at {:g} C, the darks at {:g} to {:g} C: extrapolated",
+    out.warnings.push_back(fmt::format("the image was taken at {:g} C, the darks at {:g} to {:g} C: extrapolated",
                                        *picture.temperature_c, low, high));
   }
 }
@@ -106,13 +106,13 @@ void warn_of_temperatures(std::span<const DarkLevel> levels, const DarkExposure&
 Result<void> check_range(double charge_s, double low_s, double high_s, bool line, DarkWeights& out) {
   if (charge_s > max_extrapolation * high_s) {
     return fail(ErrorCode::insufficient,
-                fmt::format("the picture holds {:.3g} times the dark charge of the longest and warmest darks, at most "
-                            "{:g} times can be computed; take darks as long and as warm as the picture",
+                fmt::format("the image has {:.3g} times the dark charge of the longest and warmest darks, more than "
+                            "the limit of {:g} times; take darks as long and as warm as the image",
                             charge_s / high_s, max_extrapolation));
   }
   if (charge_s > (1 + same_time) * high_s || (line && charge_s < (1 - same_time) * low_s)) {
     out.warnings.push_back(
-        fmt::format("dark charge is extrapolated: the picture's is that of {:.3g} s, the darks' of "
+        fmt::format("dark charge is extrapolated: that of the image corresponds to {:.3g} s, those of the darks to "
                     "{:.3g} to {:.3g} s at the same temperature",
                     charge_s, low_s, high_s));
   }
@@ -148,11 +148,12 @@ Result<std::optional<double>> doubling_for(std::span<const DarkLevel> levels, co
   if (known.doubling_c) return known.doubling_c;
   if (const auto fitted = fitted_doubling_c(levels, known.pedestal_dn)) return fitted;
   if (std::ranges::any_of(levels, near)) return std::optional<double>{};
-  return fail(ErrorCode::insufficient,
-              fmt::format("the picture was taken at {:g} C and no dark is within {:g} degree of that; take darks as "
-                          "warm as the picture, or give the degrees over which its dark charge doubles with "
-                          "--dark-doubling (sensors: 6 to 10)",
-                          *picture.temperature_c, same_temperature_c));
+  return fail(
+      ErrorCode::insufficient,
+      fmt::format(
+          "the image was taken at {:g} C and no dark within {:g} degree of that; take darks as warm as the image, or "
+          "give the doubling temperature of the dark current with --dark-doubling (sensors: 6 to 10 degrees)",
+          *picture.temperature_c, same_temperature_c));
 }
 
 }  // namespace
@@ -197,10 +198,9 @@ Result<DarkWeights> weigh_darks(std::span<const DarkLevel> levels, const DarkExp
       return tl::make_unexpected(good.error());
     }
     if (!line && !known.pedestal_dn && !known.pedestal_from_picture) {
-      return fail(ErrorCode::insufficient,
-                  fmt::format("darks of {:g} s are to be scaled to {:g} s and the file does not state the level of no "
-                              "charge; add darks of the shortest exposure time",
-                              levels[high.level].exposure.time_s, picture.time_s));
+      return fail(ErrorCode::insufficient, fmt::format("darks of {:g} s cannot be scaled to {:g} s, because the "
+                                                       "pedestal is not known; add darks of the shortest exposure time",
+                                                       levels[high.level].exposure.time_s, picture.time_s));
     }
     out->scale = high.charge > 0 ? picture.time_s / high.charge : 1;
     line ? weigh_line(doses, picture.time_s, *out) : weigh_above_pedestal(doses, picture.time_s, *out);

@@ -54,11 +54,10 @@ Result<void> measure_noise(DarkFit& s) {
       const auto figures = figures_of({s.groups.subspan(g, 1), {&one, 1}}, s.mask, site);
       noise[site] = figures.temporal_variance * s.groups[g].frames;
       if (noise[site] >= dithered_variance_dn2) continue;
-      return fail(
-          ErrorCode::insufficient,
-          fmt::format("group {} of the darks scatters by {:.2g} DN, so that whole codes do not average out; means "
-                      "need {:.2g} DN (half a code and its rounding); use a higher gain",
-                      g + 1, std::sqrt(noise[site]), std::sqrt(dithered_variance_dn2)));
+      return fail(ErrorCode::insufficient,
+                  fmt::format("the noise of group {} of the darks is {:.2g} DN, less than the {:.2g} DN that average "
+                              "out the rounding to codes; use a higher gain",
+                              g + 1, std::sqrt(noise[site]), std::sqrt(dithered_variance_dn2)));
     }
     s.noise_dn2.push_back(noise);
   }

@@ -40,7 +40,7 @@ struct Job {
 Result<void> check_request(const DarkRequest& r) {
   if (!(r.noise_fraction > 0 && r.noise_fraction <= 1)) {
     return fail(ErrorCode::invalid_argument,
-                fmt::format("the fraction of noise that darks may add is {:g}, expected above 0 and at most 1",
+                fmt::format("the fraction of variance that darks may add is {:g}, expected above 0 and at most 1",
                             r.noise_fraction));
   }
   if (r.doubling_c && !(*r.doubling_c >= min_doubling_c && *r.doubling_c <= max_doubling_c)) {
@@ -61,15 +61,16 @@ Result<FrameSetting> check_frames(Groups groups, const RawDn& picture) {
   if (!setting) return setting;
   if (groups.empty()) return fail(ErrorCode::insufficient, "there are no dark frames");
   if (!setting->exposure_s) {
-    return fail(ErrorCode::insufficient, "the picture does not state its exposure time, which darks are matched by");
+    return fail(ErrorCode::insufficient, "the image does not state its exposure time, which is needed to match darks");
   }
   for (const DarkGroup& group : groups) {
     if (!group.setting.exposure_s) {
-      return fail(ErrorCode::insufficient, "a dark frame does not state its exposure time, which darks are matched by");
+      return fail(ErrorCode::insufficient,
+                  "a dark frame does not state its exposure time, which is needed to match it to the image");
     }
     auto same = check_same_camera(*setting, group.setting, "the dark frame");
     if (same) continue;
-    same.error().message += "; the first frame is the picture: take darks with its camera, size and ISO";
+    same.error().message += "; the first frame is the image: take darks with the same camera, image size and ISO";
     return tl::make_unexpected(same.error());
   }
   return setting;
@@ -239,11 +240,10 @@ Result<PixelMask> unknown_pixels(const Job& job, const RawDn& picture, DarkFrame
   const auto unknown = std::count(mask.data(), mask.data() + mask.size(), std::uint8_t{1});
   const double share = static_cast<double>(unknown) / static_cast<double>(mask.size());
   if (share > max_unknown) {
-    return fail(
-        ErrorCode::malformed,
-        fmt::format("{:.3g} % of the darks' pixels are saturated or too noisy to subtract, at most {:.3g} % may; "
-                    "are these dark frames? Take shorter or colder ones",
-                    100 * share, 100 * max_unknown));
+    return fail(ErrorCode::malformed,
+                fmt::format("{:.3g} % of the pixels of the darks are saturated or too noisy to subtract, at most "
+                            "{:.3g} % are allowed; are these dark frames? Take shorter or colder ones",
+                            100 * share, 100 * max_unknown));
   }
   out.unknown.reserve(static_cast<std::size_t>(unknown));
   for (int y = 0; y < mask.height(); ++y) {
@@ -271,8 +271,8 @@ void describe(const Job& job, bool estimated, DarkFrame& out) {
   out.frames = static_cast<int>(std::lround(frames));
   if (out.frames == 1) {
     out.warnings.emplace_back(
-        "a single dark does not separate its pattern from its noise: hot pixels and columns are taken from it, no "
-        "more; state the number of frames of a master dark with --dark-frame-count");
+        "with a single dark, only hot pixels and columns are corrected, because its pattern cannot be separated from "
+        "its noise; for a master dark state the number of frames with --dark-frame-count");
   }
   out.scale = job.weights.scale;
   out.doubling_c = job.weights.doubling_c.value_or(0);
@@ -290,10 +290,9 @@ void settle_noise(const Job& job, double share, const PixelMask& unknown, DarkFr
     out.pattern_fraction = std::min(out.pattern_fraction, kept.pixel_fraction);
   }
   if (out.noise_fraction > share) {
-    out.warnings.push_back(
-        fmt::format("hot pixels alone add {:.2g} of the picture's variance in the dark, {:.2g} was "
-                    "allowed: more darks would add less",
-                    out.noise_fraction, share));
+    out.warnings.push_back(fmt::format(
+        "hot pixels alone add {:.2g} times the variance of the image without light, {:.2g} is allowed: take more darks",
+        out.noise_fraction, share));
   }
 }
 

@@ -65,10 +65,9 @@ Result<double> excluded_fraction(const PixelMask& mask) {
   const auto excluded = std::count(mask.data(), mask.data() + mask.size(), std::uint8_t{1});
   const double share = static_cast<double>(excluded) / static_cast<double>(mask.size());
   if (share <= max_excluded) return share;
-  return fail(
-      ErrorCode::insufficient,
-      fmt::format("{:.2g} % of the pixels are far from the others, at most {:g} % are allowed; are these dark frames?",
-                  100 * share, 100 * max_excluded));
+  return fail(ErrorCode::insufficient,
+              fmt::format("{:.2g} % of the pixels are outliers, at most {:g} % are allowed; are these dark frames?",
+                          100 * share, 100 * max_excluded));
 }
 
 double dark_charge_dn(const DarkFit& s, const std::vector<PerSite<Estimate>>& parameters, std::size_t g, int site) {

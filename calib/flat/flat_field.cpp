@@ -146,21 +146,20 @@ Result<SiteFlat> measure_site(const DarkGroup& flats, const FlatLevels& levels, 
   out.centre_dn = centre_of(out.local);
   const double range = *std::ranges::min_element(flats.setting.white_dn) - levels.black_dn[site];
   if (!(out.centre_dn >= min_centre * range)) {
-    return unfit(
-        fmt::format("the flat is too dark: its centre has {:.2g} % of the range, at least {:g} % are needed; "
-                    "expose it longer",
-                    100 * out.centre_dn / range, 100 * min_centre));
+    return unfit(fmt::format(
+        "the flat is too dark: its centre is at {:.2g} % of the range, at least {:g} % are required; expose it longer",
+        100 * out.centre_dn / range, 100 * min_centre));
   }
   const double least = *std::min_element(out.local.data(), out.local.data() + out.local.size());
   if (!(least >= min_local * out.centre_dn)) {
-    return unfit(fmt::format("the flat falls to {:.2g} % of its centre, {:g} % are expected at least; light it evenly",
+    return unfit(fmt::format("the flat falls to {:.2g} % of its centre, at least {:g} % are required; light it evenly",
                              100 * least / out.centre_dn, 100 * min_local));
   }
   out.deviation = deviation_of(out);
   if (out.deviation > max_deviation) {
     return unfit(
-        fmt::format("neighbouring pixels of the flat differ by {:.2g} %, at most {:g} % are expected; take it "
-                    "of an even surface, out of focus",
+        fmt::format("neighbouring pixels of the flat differ by {:.2g} %, at most {:g} % are allowed; take it of an "
+                    "even surface, out of focus",
                     100 * out.deviation, 100 * max_deviation));
   }
   // A deviation from the mean of `window` pixels has a fraction 1 - 1 / window of the noise and of the pattern.
@@ -184,8 +183,8 @@ Result<void> check_not_clipped(const DarkGroup& flats, const FlatLevels& levels)
   const double fraction = static_cast<double>(clipped) / static_cast<double>(flats.mean_dn.size());
   if (fraction <= max_clipped) return {};
   return unfit(
-      fmt::format("{:.2g} % of the flat's pixels are clipped or nearly so, at most {:g} % may; expose it for "
-                  "about half of the range",
+      fmt::format("{:.2g} % of the pixels of the flat are clipped or nearly clipped, at most {:g} % are allowed; "
+                  "expose it for about half of the range",
                   100 * fraction, 100 * max_clipped));
 }
 

@@ -26,7 +26,8 @@ using Pairs = std::span<const PairStatistics>;
 
 Result<void> check_darks(Pairs darks) {
   if (darks.empty()) {
-    return fail(ErrorCode::insufficient, "there are no darks; photon transfer needs two frames with the lens covered");
+    return fail(ErrorCode::insufficient,
+                "there are no darks; the photon transfer method needs two frames with the lens covered");
   }
   for (std::size_t i = 0; i < darks.size(); ++i) {
     const auto what = fmt::format("pair {} of the darks", i + 1);

@@ -184,7 +184,8 @@ Result<DarktableTable> parse_darktable_noise(std::string_view json) {
   TableReader reader;
   if (const auto read = read_json(json, max_darktable_bytes, reader); !read) return tl::make_unexpected(read.error());
   if (reader.table.empty()) {
-    return fail(ErrorCode::malformed, "no camera with figures of noise: this is not darktable's noiseprofiles.json");
+    return fail(ErrorCode::malformed,
+                "the file has no camera with noise figures: it is not darktable's noiseprofiles.json");
   }
   return std::move(reader.table);
 }

@@ -85,7 +85,7 @@ Result<void> read_json(std::string_view json, std::size_t max_bytes, JsonReader&
     return fail(ErrorCode::malformed, "this is not JSON");
   }
   if (!events.failure().empty()) return fail(ErrorCode::malformed, events.failure());
-  return fail(ErrorCode::too_large, "more entries than any such file has");
+  return fail(ErrorCode::too_large, "it has more entries than such a file can have");
 }
 
 }  // namespace lowlux::calib

@@ -96,20 +96,21 @@ void add_provenance(const RaspberryTuning& tuning, const TunedSensor& sensor, Ga
 Result<void> check(const TuningReader& found) {
   if (!found.has_slope || !found.has_constant) {
     return fail(ErrorCode::malformed,
-                "no rpi.noise with reference_constant and reference_slope: this is not a tuning file of a Raspberry "
-                "Pi camera, or it states no noise");
+                "the file has no rpi.noise with reference_constant and reference_slope: it is not a tuning file of a "
+                "Raspberry Pi camera, or states no noise");
   }
   const RaspberryTuning& t = found.tuning;
   if (!(t.reference_slope > 0 && t.reference_slope < max_slope)) {
-    return fail(ErrorCode::malformed, fmt::format("reference_slope is {:g}, possible are values above 0 and below {:g}",
-                                                  t.reference_slope, max_slope));
+    return fail(ErrorCode::malformed,
+                fmt::format("reference_slope is {:g}, expected above 0 and below {:g}", t.reference_slope, max_slope));
   }
   if (!(t.reference_constant >= 0 && t.reference_constant <= max_constant)) {
     return fail(ErrorCode::malformed,
-                fmt::format("reference_constant is {:g}, possible are 0 to {:g}", t.reference_constant, max_constant));
+                fmt::format("reference_constant is {:g}, expected 0 to {:g}", t.reference_constant, max_constant));
   }
   if (!found.has_black || !(t.black_level >= 0 && t.black_level < codes_16_bits / 2)) {
-    return fail(ErrorCode::malformed, "no rpi.black_level with a black_level of 0 to 32767 (16-bit codes)");
+    return fail(ErrorCode::malformed,
+                "the file has no rpi.black_level with a black_level of 0 to 32767 (16-bit codes)");
   }
   return {};
 }
@@ -165,7 +166,7 @@ double tuning_gain_dn_per_e(const RaspberryTuning& tuning, int bits) {
 
 Result<CameraProfile> profile_of_tuning(const RaspberryTuning& tuning, const TunedSensor& sensor) {
   if (sensor.bits < 8 || sensor.bits > 16) {
-    return fail(ErrorCode::invalid_argument, fmt::format("a sensor of {} bits: possible are 8 to 16", sensor.bits));
+    return fail(ErrorCode::invalid_argument, fmt::format("the sensor has {} bits, expected 8 to 16", sensor.bits));
   }
   if (!(sensor.max_gain > 1)) {
     return fail(ErrorCode::invalid_argument,

@@ -70,8 +70,8 @@ Result<void> check(const RawDn& raw, const PerSite<double>& black_dn, const Pict
   }
   if (raw.is_float()) {
     return fail(ErrorCode::unsupported,
-                "the samples are floating-point numbers, as of a merge of exposures, whose noise no straight line "
-                "describes: give the raw with the codes of the sensor");
+                "the samples are floating-point numbers, as those of merged exposures, whose variance is not linear in "
+                "the signal: use a raw file with the codes of the sensor");
   }
   if (options.max_samples < 1 || options.max_samples > 10'000'000) {
     return fail(ErrorCode::invalid_argument,
@@ -153,7 +153,7 @@ Result<void> check_fit(const NoiseLine& line) {
     return fail(
         ErrorCode::insufficient,
         fmt::format(
-            "the estimated noise without light is below 0 ({:.3g} +- {:.2g} DN^2): the black level may be wrong",
+            "the estimated variance without light is negative ({:.3g} +- {:.2g} DN^2): the black level may be wrong",
             offset.value, offset.standard_error));
   }
   return check_straight(line);
@@ -193,7 +193,7 @@ Result<Evidence> make_evidence(const RawDn& raw, const PerSite<double>& black_dn
   NoiseSamples blocks = block_samples(raw, plan, executor);
   if (blocks.sample.size() < min_samples) {
     return fail(ErrorCode::insufficient,
-                fmt::format("{} x {} pixels give {} blocks of 16 x 16, and 100 are needed: give a larger picture",
+                fmt::format("{} x {} pixels give {} blocks of 16 x 16, and 100 are needed: give a larger image",
                             raw.active.width, raw.active.height, blocks.sample.size()));
   }
   const auto clip = clip_ranges(raw, black_dn, executor);
@@ -233,7 +233,7 @@ void judge(PictureNoise& out) {
         fmt::format("the noise of the darkest areas is only {:.2f} code steps of {} DN: rounding hides part of it",
                     out.darkest_noise_steps, t.code_step_dn));
   }
-  if (t.code_step_dn > 1) out.reasons.push_back(fmt::format("only every {}th code is in use", t.code_step_dn));
+  if (t.code_step_dn > 1) out.reasons.push_back(fmt::format("only every {}th code occurs", t.code_step_dn));
   if (t.companded) {
     out.reasons.push_back(
         fmt::format("the raw was compressed with loss: its codes are {} to {} DN apart, depending on brightness",

@@ -97,9 +97,10 @@ Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<
   const auto above = std::find_if(stated.begin(), stated.end(), [&](const auto* g) { return *g->iso > *iso; });
   if (above == stated.begin() || above == stated.end()) {
     const GainProfile& nearest = above == stated.begin() ? *stated.front() : *stated.back();
-    return GainAtIso{beyond(nearest, *iso / *nearest.iso),
-                     fmt::format("ISO {:g} lies beyond the profile's ({}): the gain is extrapolated from ISO {:g}",
-                                 *iso, names_of(stated), *nearest.iso)};
+    return GainAtIso{
+        beyond(nearest, *iso / *nearest.iso),
+        fmt::format("ISO {:g} is outside the range of the profile ({}): the gain is extrapolated from ISO {:g}", *iso,
+                    names_of(stated), *nearest.iso)};
   }
   const GainProfile &low = **(above - 1), &high = **above;
   const double share = std::log(*iso / *low.iso) / std::log(*high.iso / *low.iso);

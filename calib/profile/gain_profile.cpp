@@ -326,10 +326,9 @@ Result<BlackFigures> measure_black(const DarkGroup& group, double gain_dn_per_e)
   out.column_noise_dn = std::sqrt(std::max(0.0, column));
   out.excluded_fraction = 1 - static_cast<double>(out.pixels) / static_cast<double>(mask.size());
   if (out.excluded_fraction <= max_excluded) return out;
-  return fail(
-      ErrorCode::insufficient,
-      fmt::format("{:.2g} % of the pixels are far from the others, at most {:g} % are allowed; is this frame dark?",
-                  100 * out.excluded_fraction, 100 * max_excluded));
+  return fail(ErrorCode::insufficient,
+              fmt::format("{:.2g} % of the pixels are outliers, at most {:g} % are allowed; is this a dark frame?",
+                          100 * out.excluded_fraction, 100 * max_excluded));
 }
 
 Result<BlackFigures> measure_black(const RawDn& frame, double gain_dn_per_e) {

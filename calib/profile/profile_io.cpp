@@ -36,7 +36,7 @@ class Reader {
     if (failure_.error) return;
     for (const auto& [key, value] : node_.items()) {
       if (!asked_.contains(key)) {
-        failure_.set(ErrorCode::malformed, joined(path_, key), "this key is not known; is a unit or a letter wrong?");
+        failure_.set(ErrorCode::malformed, joined(path_, key), "this key is not known; is it misspelt?");
       }
     }
   }
@@ -98,7 +98,7 @@ class Reader {
       ++index;
     }
     failure_.set(ErrorCode::malformed, joined(path_, key),
-                 fmt::format("found \"{}\", possible are {}", found, possible));
+                 fmt::format("found \"{}\", expected one of {}", found, possible));
   }
 
   template <class Visit>
@@ -170,7 +170,7 @@ class Reader {
     }
     if (value->size() >= least && value->size() <= most) return value;
     failure_.set(ErrorCode::malformed, joined(path_, key),
-                 fmt::format("found {} entries, possible are {} to {}", value->size(), least, most));
+                 fmt::format("found {} entries, expected {} to {}", value->size(), least, most));
     return nullptr;
   }
 
@@ -207,7 +207,7 @@ Error error_of(const JsonFault& fault, std::string_view text) {
     case JsonFault::Kind::number_too_large:
       return {ErrorCode::malformed, "the profile is not JSON: restore the file, or calibrate again", ""};
     case JsonFault::Kind::too_deep:
-      failure.set(ErrorCode::malformed, "", "nested deeper than a profile is");
+      failure.set(ErrorCode::malformed, "", "nested deeper than a valid profile");
       break;
     case JsonFault::Kind::too_many_keys:
       failure.set(ErrorCode::malformed, "", fmt::format("an object has more than {} keys", max_keys));
@@ -249,8 +249,9 @@ Result<CameraProfile> parse_profile(std::string_view text) {
   }
   reader.integer("version", version, {1, 1e9});
   if (!failure.error && version > profile_version) {
-    failure.set(ErrorCode::unsupported, "version",
-                fmt::format("found {}, this program reads up to {}; use a newer one", version, profile_version));
+    failure.set(
+        ErrorCode::unsupported, "version",
+        fmt::format("found {}, this version of lowlux reads up to {}; use a newer version", version, profile_version));
   }
   visit_profile(reader, out);
   reader.finish();
@@ -318,7 +319,7 @@ class Writer {
     const std::string path = joined(path_, key);
     if (values.size() > most) {
       return failure_.set(ErrorCode::too_large, path,
-                          fmt::format("found {} entries, a profile holds at most {}", values.size(), most));
+                          fmt::format("found {} entries, expected at most {}", values.size(), most));
     }
     for (std::size_t i = 0; i < values.size(); ++i) {
       Writer inner(array.emplace_back(), indexed(path, i), failure_);
@@ -328,7 +329,7 @@ class Writer {
   void texts(const char* key, const std::vector<std::string>& values, std::size_t most) {
     if (values.size() > most) {
       failure_.set(ErrorCode::too_large, joined(path_, key),
-                   fmt::format("found {} entries, a profile holds at most {}", values.size(), most));
+                   fmt::format("found {} entries, expected at most {}", values.size(), most));
     }
     node_[key] = values;
   }

@@ -18,7 +18,7 @@ std::string indexed(const std::string& path, std::size_t i) { return fmt::format
 bool check_range(double value, const Range& range, const std::string& path, ProfileFailure& failure) {
   if (value >= range.low && value <= range.high) return true;
   failure.set(ErrorCode::malformed, path,
-              fmt::format("found {:g}, possible are {:g} to {:g}", value, range.low, range.high));
+              fmt::format("found {:g}, expected {:g} to {:g}", value, range.low, range.high));
   return false;
 }
 

@@ -70,10 +70,10 @@ double temperature_factor(const GainProfile& gain, const FrameInfo& info, double
       (celsius < gain.dark_temperature_c->low - same_temperature_c ||
        celsius > gain.dark_temperature_c->high + same_temperature_c)) {
     warnings.push_back(
-        fmt::format("the sensor was at {:g} C, the profile's darks at {:g} to {:g} C: dark current is "
+        fmt::format("the sensor was at {:g} C, the darks of the profile at {:g} to {:g} C: the dark current is "
                     "extrapolated, doubling every {:.2g} C{}",
                     celsius, gain.dark_temperature_c->low, gain.dark_temperature_c->high, sensor.dark_doubling_c,
-                    gain.errors.dark_doubling_c > 0 ? "" : ", a value that was not measured"));
+                    gain.errors.dark_doubling_c > 0 ? "" : " (assumed, not measured)"));
   }
   return std::exp2((celsius - sensor.dark_temperature_c) / sensor.dark_doubling_c);
 }
@@ -94,13 +94,13 @@ void warn_of_exposure(const GainProfile& gain, double exposure_s, bool scaled, s
   const auto& [low, high] = *gain.dark_exposure_s;
   if (exposure_s > high * (1 + same_exposure)) {
     warnings.push_back(
-        fmt::format("the exposure of {:g} s is longer than the profile's darks, {:g} to {:g} s: the dark "
+        fmt::format("the exposure of {:g} s is longer than those of the darks of the profile, {:g} to {:g} s: the dark "
                     "charge is {}",
                     exposure_s, low, high, scaled ? "extrapolated" : "that of the darks"));
   } else if (!scaled && exposure_s < low * (1 - same_exposure)) {
     warnings.push_back(
-        fmt::format("the exposure of {:g} s is shorter than the profile's darks, {:g} s: the dark charge "
-                    "is that of the darks",
+        fmt::format("the exposure of {:g} s is shorter than those of the darks of the profile, {:g} s: the dark charge "
+                    "of the darks is used",
                     exposure_s, low));
   }
 }

@@ -41,7 +41,8 @@ Result<CameraProfile> quoted_profile(std::string_view sensor) {
   }
   if (!out.gains.empty()) return out;
   if (const auto known = isp::sensor_named(sensor, "", {}); !known) return tl::make_unexpected(known.error());
-  return fail(ErrorCode::insufficient, fmt::format("the sources of {} do not suffice for a profile", sensor));
+  return fail(ErrorCode::insufficient,
+              fmt::format("the published figures of {} are not sufficient for a profile", sensor));
 }
 
 }  // namespace lowlux::calib

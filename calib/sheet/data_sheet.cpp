@@ -221,8 +221,8 @@ void warn_of_saturated_darks(std::span<const DarkGroup> darks, double full_dn, D
           fmt::format("the darks of {} are saturated: dark current is measured without them", setting));
     } else if (full > hot_pixels) {
       out.warnings.push_back(
-          fmt::format("{:.2g} % of the pixels are saturated in the darks of {}: the mean dark current lacks a part of "
-                      "theirs; take shorter darks",
+          fmt::format("{:.2g} % of the pixels are saturated in the darks of {}, so the mean dark current is too low; "
+                      "take shorter darks",
                       100 * full, setting));
     }
   }
@@ -236,10 +236,10 @@ std::vector<DarkOfFlats> dark_levels_of_flats(const SheetFrames& frames, const D
     if (without == nullptr && !darks.back().contains_dark_current) without = &pair.setting;
   }
   if (without == nullptr) return darks;
-  out.warnings.push_back(
-      fmt::format("quantum efficiency contains dark current: there are no two darks of the flats' {}, nor of two "
-                  "exposure times at that temperature; take darks of the exposure time of the flats",
-                  setting_text(*without)));
+  out.warnings.push_back(fmt::format(
+      "dark current is not subtracted for the quantum efficiency, because two darks of the flats' {}, or of two "
+      "exposure times at that temperature, are missing; take darks of the exposure time of the flats",
+      setting_text(*without)));
   return darks;
 }
 
@@ -256,8 +256,8 @@ Result<void> put_prnu(const DarkGroup& flats, const PerSite<SpatialParts>& short
     dark = *same;
   } else {
     out.warnings.push_back(
-        fmt::format("PRNU contains the nonuniformity of dark current: there are no two darks of the flats' {}; take 16 "
-                    "darks of the exposure time of the flats near half of saturation",
+        fmt::format("the non-uniformity of dark current is not subtracted from PRNU, because two darks of the flats' "
+                    "{} are missing; take 16 darks of the exposure time of the flats near half of saturation",
                     setting_text(flats.setting)));
   }
   for (std::size_t site = 0; site < dark.size(); ++site) dark[site].mean_dn = level.level_dn[site].value;

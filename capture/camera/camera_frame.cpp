@@ -39,7 +39,7 @@ bool can_be(const Matrix3& matrix) {
 void set_black(const std::array<double, 4>& black_dn, RawFrame& out) {
   const double white = out.raw.white_dn[0];
   if (!std::ranges::all_of(black_dn, [&](double level) { return level >= 0 && level < white; })) {
-    out.warnings.emplace_back("the camera states an impossible black level: it is ignored");
+    out.warnings.emplace_back("the camera states an implausible black level, which is ignored");
     return;
   }
   BlackLevel& tag = out.raw.black_tag.emplace();
@@ -54,7 +54,7 @@ std::optional<Vector3> neutral_of(const FrameFacts& facts, RawFrame& out) {
   if (!facts.colour_gains) return std::nullopt;
   const auto [red, blue] = *facts.colour_gains;
   if (!(red >= min_gain && red <= max_gain && blue >= min_gain && blue <= max_gain)) {
-    out.warnings.emplace_back("the camera states impossible colour gains: they are ignored");
+    out.warnings.emplace_back("the camera states implausible colour gains, which are ignored");
     return std::nullopt;
   }
   Vector3 neutral{1 / red, 1, 1 / blue};
@@ -68,7 +68,7 @@ std::optional<Matrix3> matrix_of(const FrameFacts& facts, RawFrame& out) {
   Matrix3 matrix{};
   for (std::size_t i = 0; i < 9; ++i) matrix[i / 3][i % 3] = (*facts.colour_matrix)[i];
   if (can_be(matrix)) return matrix;
-  out.warnings.emplace_back("the camera states an impossible colour matrix: it is ignored");
+  out.warnings.emplace_back("the camera states an implausible colour matrix, which is ignored");
   return std::nullopt;
 }
 
@@ -99,7 +99,7 @@ void set_colour(const FrameFacts& facts, RawFrame& out) {
   std::optional<ColourCalibration> calibration;
   if (const auto matrix = matrix_of(facts, out)) {
     calibration = calibration_of(*matrix, neutral, facts.colour_temperature_k);
-    if (!calibration) out.warnings.emplace_back("the camera states an impossible colour matrix: it is ignored");
+    if (!calibration) out.warnings.emplace_back("the camera states an implausible colour matrix, which is ignored");
   }
   if (!calibration) {
     calibration = calibration_of(identity3(), neutral, facts.colour_temperature_k);

@@ -79,7 +79,7 @@ Result<int> find_camera(std::span<const CameraListing> cameras, std::string_view
   const std::string there_is = "there is " + names_of_all(cameras);
   if (count == 0) return fail(ErrorCode::not_found, "no camera fits: " + there_is, std::string(wanted));
   return fail(ErrorCode::invalid_argument,
-              std::to_string(count) + " cameras fit, and only one can be opened: " + there_is, std::string(wanted));
+              std::to_string(count) + " cameras match, and only one can be opened: " + there_is, std::string(wanted));
 }
 
 }  // namespace lowlux::capture

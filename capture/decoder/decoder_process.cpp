@@ -249,7 +249,7 @@ Result<std::filesystem::path> own_folder() {
   if (*name != '\0' && *name != '/') {
     return fail(ErrorCode::unreadable,
                 std::string("the library ") + name +
-                    " was loaded by a relative path, so its folder is not known: load it by a whole one");
+                    " was loaded by a relative path, so its folder is not known: load it by an absolute path");
   }
   // The link to the program names its folder even if its file has been replaced since.
   const auto file = *name != '\0' ? std::filesystem::canonical(name, failed)
@@ -265,7 +265,7 @@ Result<DecodedRaw> decode_contained(std::span<const std::byte> file, const ReadL
   const FileDescriptor result(memory_file("lowlux-decoded"));
   std::optional<FileDescriptor> copy(std::in_place, memory_file("lowlux-raw"));
   if (result.get() < 0 || copy->get() < 0) {
-    return tl::make_unexpected(system_error("no memory file for the decoder", errno));
+    return tl::make_unexpected(system_error("a memory file for the decoder cannot be created", errno));
   }
   if (!write_all(copy->get(), file, 0)) {
     return fail(ErrorCode::too_large, "there is not enough memory to hand this file to the decoder");

@@ -80,7 +80,7 @@ const char* fault_of(const JxlBasicInfo& info, const JpegXlJob& job, const Part&
     return side == static_cast<std::uint32_t>(whole) || side == static_cast<std::uint32_t>(covered);
   };
   const bool sized = fits(info.xsize, job.part_width, part.width) && fits(info.ysize, job.part_height, part.height);
-  return sized ? nullptr : "it has another size than its place";
+  return sized ? nullptr : "it does not have the size of its tile";
 }
 
 /// Decodes one part. @return what is wrong with it; null if nothing is
@@ -110,7 +110,7 @@ const char* decode_part(const JpegXlJob& job, const Part& part, Decoded& out) {
         out.samples.resize(std::size_t{info.xsize} * info.ysize * format.num_channels);
         const std::size_t bytes = out.samples.size() * sizeof(std::uint16_t);
         if (JxlDecoderSetImageOutBuffer(decoder.get(), &format, out.samples.data(), bytes) != JXL_DEC_SUCCESS) {
-          return "its samples have no room";
+          return "its samples do not fit into the buffer";
         }
         break;
       }

@@ -78,10 +78,10 @@ struct Kind {
 std::string other_kind(std::span<const std::byte> bytes) {
   using std::string_view_literals::operator""sv;
   const std::string_view file = text_of(bytes);
-  constexpr Kind kinds[] = {{"\x89PNG"sv, "a PNG picture"},
-                            {"GIF8"sv, "a GIF picture"},
+  constexpr Kind kinds[] = {{"\x89PNG"sv, "a PNG image"},
+                            {"GIF8"sv, "a GIF image"},
                             {"%PDF"sv, "a PDF document"},
-                            {"\x76\x2F\x31\x01"sv, "an OpenEXR picture"}};
+                            {"\x76\x2F\x31\x01"sv, "an OpenEXR image"}};
   for (const Kind& kind : kinds) {
     if (file.starts_with(kind.magic)) return kind.what;
   }
@@ -95,10 +95,10 @@ bool is_jpeg(std::span<const std::byte> bytes) {
 /// Returns the error of a file that is not a DNG and that the decoder rejected. JPEG files can hold a raw after the
 /// image, and most raws begin as TIFF: only now is it known that they are ordinary images.
 Error not_decoded(std::span<const std::byte> bytes, Error error) {
-  if (is_jpeg(bytes)) return {ErrorCode::unsupported, "this is a JPEG picture, not a raw file", {}};
+  if (is_jpeg(bytes)) return {ErrorCode::unsupported, "this is a JPEG image, not a raw file", {}};
   if (is_printable(text_of(bytes))) return {ErrorCode::unsupported, "this is text, not a raw file", {}};
   if (error.code == ErrorCode::unsupported && TiffFile::open(bytes)) {
-    error.message = "this is a TIFF picture, or a raw file that is damaged or unknown to " + decoder_name();
+    error.message = "this is a TIFF image, or a raw file that is damaged or unknown to " + decoder_name();
   }
   return error;
 }

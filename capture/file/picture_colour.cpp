@@ -34,7 +34,7 @@ std::vector<float> tabulate(int codes, const Curve& curve) {
 }
 
 tl::unexpected<Error> damaged(const std::string& what) {
-  return fail(ErrorCode::malformed, "the ICC profile of the picture " + what + ": remove it, or convert to sRGB");
+  return fail(ErrorCode::malformed, "the ICC profile of the image " + what + ": remove it, or convert to sRGB");
 }
 
 /// Returns a curve, clamped to 0..1, the range ICC defines.
@@ -95,7 +95,7 @@ Result<DisplayColour> icc_colour(std::span<const std::byte> bytes, int codes) {
   if (shaped && space == cmsSigGrayData) return grey_colour(profile.get(), codes);
   if (!shaped || space != cmsSigRgbData) {
     return fail(ErrorCode::unsupported,
-                "the ICC profile of the picture is not one of three curves and a matrix: convert the picture to sRGB");
+                "the ICC profile of the image is not one of three curves and a matrix: convert the image to sRGB");
   }
   DisplayColour colour;
   constexpr cmsTagSignature tags[] = {cmsSigRedTRCTag, cmsSigGreenTRCTag, cmsSigBlueTRCTag};

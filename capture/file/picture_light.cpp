@@ -60,7 +60,7 @@ template <class Code>
 Result<SceneLinear> light_of_codes(const Encoded<Code>& picture, const DisplayColour& colour, Orientation orientation,
                                    Executor& executor) {
   if (colour.grey && !is_grey(picture.codes)) {
-    return fail(ErrorCode::malformed, "the picture has colours, its ICC profile is one for grey: convert it to sRGB");
+    return fail(ErrorCode::malformed, "the image has colours, its ICC profile is one for grey: convert it to sRGB");
   }
   const Placement p = placement_of(picture.width(), picture.height(), orientation);
   SceneLinear xyz(p.width, p.height);
@@ -147,7 +147,7 @@ Result<void> check_radiance(const SceneLinear& picture, Executor& executor, Nega
   const Survey survey = survey_of(picture, executor);
   if (survey.not_finite.found()) {
     return fail(ErrorCode::malformed,
-                text_of(picture, survey.not_finite) + ", which is not a valid radiance: repair the picture");
+                text_of(picture, survey.not_finite) + ", which is not a valid radiance: repair the image");
   }
   if (survey.negatives == 0) return {};
   const double samples = 3.0 * static_cast<double>(picture.plane[0].size());
@@ -158,7 +158,7 @@ Result<void> check_radiance(const SceneLinear& picture, Executor& executor, Nega
   if (negatives == Negatives::few && fraction > max_negative_fraction) {
     return fail(ErrorCode::malformed, found + ", " + light + " and more than the " +
                                           number_text(100 * max_negative_fraction) +
-                                          " % that filters leave: clip the picture at 0 if that is meant");
+                                          " % that filters leave: clip the image at 0 if that is meant");
   }
   warnings.push_back(found + ", " + light + ": they become 0");
   return {};

@@ -51,7 +51,7 @@ Result<Decoder> tiff_decoder_of(std::span<const std::byte> bytes) {
   const auto first = tiff->directory(tiff->first_directory());
   if (!first) return isp::decode_tiff;
   if (is_dng(*first)) {
-    return fail(ErrorCode::unsupported, "this is a raw file (DNG), not a picture: develop it first");
+    return fail(ErrorCode::unsupported, "this is a raw file (DNG), not an image: develop it first");
   }
   if (is_thumbnail(*first)) {
     return fail(ErrorCode::unsupported,
@@ -112,7 +112,7 @@ Result<Matrix3> matrix_of_floats(const isp::FileMetadata& metadata) {
   if (!colour) return pass_on(colour);
   if (!is_linear(*colour)) {
     return fail(ErrorCode::unsupported,
-                "the picture has floats and an ICC profile with a curve: convert it to a linear profile");
+                "the image has floats and an ICC profile with a curve: convert it to a linear profile");
   }
   return colour->to_xyz;
 }

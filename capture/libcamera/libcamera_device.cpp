@@ -154,7 +154,7 @@ Result<CameraFormat> LibcameraDevice::configure(const CameraRequest& request, st
     return fail(ErrorCode::unsupported, "libcamera has no valid configuration for a raw stream alone", name_);
   }
   if (!has_flips(request, *configuration_)) {
-    warnings.emplace_back("the camera cannot flip its picture as asked for: it is as the sensor reads it");
+    warnings.emplace_back("the camera does not support the requested flip: the image is as the sensor reads it");
   }
   const AgreedStream agreed{.drm_fourcc = stream.pixelFormat.fourcc(),
                             .drm_modifier = stream.pixelFormat.modifier(),
@@ -212,7 +212,7 @@ Result<void> LibcameraDevice::add_buffer(int buffer) {
   }
   auto request = camera_->createRequest(static_cast<std::uint64_t>(buffer));
   if (!request || request->addBuffer(stream, frame_buffer.get()) < 0) {
-    return fail(ErrorCode::unreadable, "libcamera makes no request for a buffer of the camera");
+    return fail(ErrorCode::unreadable, "libcamera cannot create a request for a buffer of the camera");
   }
   planes_.push_back(std::move(*mapped));
   requests_.push_back(std::move(request));

@@ -39,7 +39,7 @@ Result<std::unique_ptr<Camera>> open_one(const std::string& which, const CameraR
   const auto place = find_camera(cameras, which);
   if (!place) return tl::make_unexpected(place.error());
   auto camera = (*manager)->get(cameras[static_cast<std::size_t>(*place)].id);
-  if (!camera) return fail(ErrorCode::not_found, "the camera is gone: is it unplugged?", which);
+  if (!camera) return fail(ErrorCode::not_found, "the camera is no longer available: was it unplugged?", which);
 
   OpenRequestDevice open{
       .completions = nullptr, .device = nullptr, .name = libcamera_name(*camera), .format = {}, .warnings = {}};

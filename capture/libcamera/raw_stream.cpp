@@ -105,9 +105,7 @@ Result<RawStreamChoice> choose_raw_stream(std::span<const OfferedStream> offered
   const std::vector<std::string> there_is = raw_stream_texts(offered);
   if (there_is.empty()) {
     return fail(ErrorCode::unsupported,
-                "this camera offers no raw stream: lowlux develops raw frames only, and libcamera's pipeline for it "
-                "gives processed pictures or formats unknown here",
-                camera);
+                "this camera offers no raw stream in a known format, and lowlux develops raw frames only", camera);
   }
   const OfferedStream* best = nullptr;
   std::optional<RawFormat> best_format;

@@ -22,7 +22,8 @@ constexpr milliseconds patience_after_cancel{200};
 
 Error device_error(int negative_errno, const std::string& doing, const std::string& camera) {
   const int code = -negative_errno;
-  if (code == ENODEV || code == ENXIO) return {ErrorCode::not_found, "the camera is gone: is it unplugged?", camera};
+  if (code == ENODEV || code == ENXIO)
+    return {ErrorCode::not_found, "the camera is no longer available: was it unplugged?", camera};
   if (code == EBUSY) {
     return {ErrorCode::unreadable, "cannot " + doing + " the camera: another program uses it", camera};
   }

@@ -42,8 +42,9 @@ void set_frame_duration(const CameraRequest& request, const OfferedControl& cont
       controls.frame_duration_us = {whole_us(frame_us), whole_us(frame_us)};
     }
     if (request.exposure_s && *request.exposure_s * 1e6 > frame_us) {
-      controls.warnings.push_back("an exposure of " + number_text(*request.exposure_s) + " s does not fit a frame at " +
-                                  number_text(*request.frame_rate_hz) + " Hz: the camera shortens one of them");
+      controls.warnings.push_back("an exposure of " + number_text(*request.exposure_s) +
+                                  " s is longer than a frame at " + number_text(*request.frame_rate_hz) +
+                                  " Hz: the camera shortens one of them");
     }
   } else if (controls.exposure_us && *controls.exposure_us > usual_frame_us && control.offered) {
     // Rows are read after the exposure, so a frame is longer than it by some rows; the camera uses the minimum it

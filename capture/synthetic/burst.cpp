@@ -171,7 +171,7 @@ Result<BurstSource> BurstSource::of(Scene scene, isp::NamedSensor sensor, Spectr
   if (!camera) return tl::make_unexpected(camera.error());
   if (options.sampling == PhotonSampling::published) {
     return fail(ErrorCode::invalid_argument,
-                "published photon sampling is for single scenes: sample bursts physically");
+                "published photon sampling does not support bursts: use physical sampling");
   }
   if (const auto good = check_points(scene); !good) return tl::make_unexpected(good.error());
   if (const auto good = check_burst(burst, image_size(scene, burst)); !good) return tl::make_unexpected(good.error());

@@ -138,10 +138,9 @@ Result<void> ExposedSensor::check_means(const std::vector<isp::BlockLevel>& bloc
     if (!kept.has(Effect::clipping)) mean_e = std::max(mean_e, largest_mean_e(blocks[i], kept));
   }
   if (mean_e <= poisson_max_mean) return {};
-  return fail(
-      ErrorCode::invalid_argument,
-      "a pixel may collect " + number_text(mean_e, 3) +
-          " e- on average, above the sampler's limit of 1e6, and clipping is left out: keep it, or expose less");
+  return fail(ErrorCode::invalid_argument,
+              "a pixel may collect " + number_text(mean_e, 3) +
+                  " e- on average, above the sampler's limit of 1e6: simulate clipping, or expose less");
 }
 
 void ExposedSensor::choose_storage() {

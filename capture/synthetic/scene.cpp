@@ -35,7 +35,7 @@ Result<Scene> empty_scene(const SceneSetup& setup) {
   }
   if (const auto good = check_luminance(setup.luminance_cd_m2); !good) return tl::make_unexpected(good.error());
   if (*std::min_element(setup.light.values().begin(), setup.light.values().end()) < 0) {
-    return wrong("a light has no negative power", setup.light_name);
+    return wrong("the power of a light must not be negative", setup.light_name);
   }
   auto white = isp::radiance_of(setup.light, setup.luminance_cd_m2);
   if (!white)

@@ -43,16 +43,16 @@ Result<void> check_options(const SensorModel& sensor, const SyntheticOptions& op
     return fail(ErrorCode::invalid_argument, "masked columns are an even number between 0 and 4096");
   }
   if (const auto& t = options.effects.tolerance; t && (!(t->delta_e > 0) || !(t->relative_variance > 0))) {
-    return fail(ErrorCode::invalid_argument, "a tolerance must be above 0: ask for all effects to leave none out");
+    return fail(ErrorCode::invalid_argument, "a tolerance must be above 0: use the effects all to leave none out");
   }
   if (options.sampling == PhotonSampling::published && options.effects.tolerance) {
     return fail(ErrorCode::invalid_argument,
-                "the planner knows the variance of physical photons only: name the effects of published sampling");
+                "the planner supports physical sampling only: name the effects of published sampling");
   }
   if (options.sampling == PhotonSampling::published && sensor.crosstalk > 0 &&
       options.effects.effects.has(isp::Effect::crosstalk)) {
     return fail(ErrorCode::invalid_argument,
-                "published photon sampling draws each pixel by itself: leave crosstalk out of the effects");
+                "published photon sampling does not support crosstalk: leave it out of the effects");
   }
   if (!(options.lens_blur_px >= 0) || !(options.lens_blur_px <= max_lens_blur_px)) {
     return fail(ErrorCode::invalid_argument,
@@ -60,7 +60,7 @@ Result<void> check_options(const SensorModel& sensor, const SyntheticOptions& op
   }
   if (options.sampling == PhotonSampling::published && options.simulated_blur_px() > 0) {
     return fail(ErrorCode::invalid_argument,
-                "published photon sampling draws each pixel by itself: leave lens-blur out of the effects");
+                "published photon sampling does not support lens-blur: leave it out of the effects");
   }
   if (!(options.f_number >= 0.5) || !(options.f_number <= 1000)) {
     return fail(ErrorCode::invalid_argument, "the f-number must lie between 0.5 and 1000");

@@ -18,7 +18,7 @@ Result<SyntheticSource> SyntheticSource::of(Scene scene, isp::NamedSensor sensor
   auto camera = make_camera(std::move(sensor), response, scene.white, options);
   if (!camera) return tl::make_unexpected(camera.error());
   if (options.sampling == PhotonSampling::published && !scene.points.empty()) {
-    return fail(ErrorCode::invalid_argument, "published photon sampling draws pixels, not points: leave the stars out");
+    return fail(ErrorCode::invalid_argument, "published photon sampling does not support stars: leave them out");
   }
   if (const auto good = check_points(scene); !good) return tl::make_unexpected(good.error());
   SyntheticSource source(std::move(scene), std::move(response), options);
@@ -44,10 +44,9 @@ Result<void> SyntheticSource::check_photons(Executor& executor) const {
   const std::optional<PhotonRows> rows = photon_rows();
   const double photons = rows ? rows->largest_mean_per_s(executor) * options_.exposure.time_s : 0;
   if (photons <= poisson_max_mean) return {};
-  return fail(ErrorCode::invalid_argument,
-              "published photon sampling expects " + number_text(photons, 3) +
-                  " photons in one bin of wavelengths, above the sampler's limit of 1e6: sample physically, or expose "
-                  "less");
+  return fail(ErrorCode::invalid_argument, "published photon sampling expects " + number_text(photons, 3) +
+                                               " photons in one bin of wavelengths, above the sampler's limit of 1e6: "
+                                               "use physical sampling, or expose less");
 }
 
 std::optional<PhotonRows> SyntheticSource::photon_rows() const {

@@ -62,7 +62,7 @@ Error not_started(const V4l2Device& device, int code) {
               device.path()};
     case ENOSPC:
       return {ErrorCode::unreadable,
-              "streaming does not start: the bus has not the bandwidth, ask for a smaller size or frame rate",
+              "streaming does not start: the bandwidth of the bus is too low, request a smaller size or frame rate",
               device.path()};
     default:
       return device.error(code, "streaming does not start");
@@ -136,7 +136,7 @@ Result<int> V4l2Buffers::exported(std::uint32_t index) {
     if (code != ENOTTY && code != EINVAL) {
       return tl::make_unexpected(device_.error(code, "the driver does not export its buffer"));
     }
-    return fail(ErrorCode::unsupported, "the driver of " + device_.name() + " exports no DMA buffers: have them mapped",
+    return fail(ErrorCode::unsupported, "the driver of " + device_.name() + " exports no DMA buffers: use mmap",
                 device_.path());
   }
   if (asked.fd < 0) return fail(ErrorCode::malformed, "the driver exports a buffer without a file", device_.path());

@@ -54,10 +54,11 @@ Result<std::unique_ptr<V4l2Device>> V4l2Device::open(const V4l2System& system, c
     if (code == ENOENT || code == ENOTDIR || code == ENODEV || code == ENXIO) {
       return fail(ErrorCode::not_found, "there is no such device: connect the camera, or name another device", path);
     }
-    const std::string reason = code == EBUSY ? "another program uses it: end that program, or take another device"
-                               : code == EACCES || code == EPERM
-                                   ? "it may not be opened: become a member of the group that owns it, mostly 'video'"
-                                   : "it cannot be opened: " + std::system_category().message(code);
+    const std::string reason =
+        code == EBUSY ? "another program uses it: end that program, or take another device"
+        : code == EACCES || code == EPERM
+            ? "no permission to open it: the user must be in the group that owns it, mostly 'video'"
+            : "it cannot be opened: " + std::system_category().message(code);
     return fail(ErrorCode::unreadable, reason, path);
   }
   std::unique_ptr<V4l2Device> device(new V4l2Device(system, path, file));

@@ -72,9 +72,10 @@ Result<void> apply_gain(V4l2Device& device, const V4l2Options& options, std::vec
     warnings.emplace_back("gain: the driver has no control for it");
   } else if (options.gain_code) {
     if (*options.gain_code < gain->minimum || *options.gain_code > gain->maximum) {
-      return fail(ErrorCode::invalid_argument,
-                  "gain code " + std::to_string(*options.gain_code) + " is none of the driver's " + range_text(*gain),
-                  device.path());
+      return fail(
+          ErrorCode::invalid_argument,
+          "gain code " + std::to_string(*options.gain_code) + " is not one of the driver's " + range_text(*gain),
+          device.path());
     }
     set_gain(device, *gain, *options.gain_code, warnings);
   } else if (*factor == 1.0 && gain->id == V4L2_CID_ANALOGUE_GAIN) {
@@ -182,7 +183,7 @@ void apply_frame_rate(V4l2Device& device, const CameraRequest& request, CameraFo
   if (!format.frame_rate_hz) {
     warnings.push_back(asked + "the driver has no control for it");
   } else if (std::abs(*format.frame_rate_hz / *request.frame_rate_hz - 1) > 1e-3) {
-    warnings.push_back(asked + "the driver keeps to " + number_text(*format.frame_rate_hz) + " Hz");
+    warnings.push_back(asked + "the driver keeps " + number_text(*format.frame_rate_hz) + " Hz");
   }
 }
 

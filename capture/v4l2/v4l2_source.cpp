@@ -29,7 +29,7 @@ Result<void> check_request(const V4l2Options& options) {
   if (auto ok = check_range(request.exposure_s, 1e-7, 1e5, "an exposure time [s]"); !ok) return ok;
   if (auto ok = check_range(request.analogue_gain, 1, 1e4, "an analogue gain"); !ok) return ok;
   if (request.analogue_gain && options.gain_code) {
-    return fail(ErrorCode::invalid_argument, "a gain is given as a factor and as a code: give one of them");
+    return fail(ErrorCode::invalid_argument, "a gain is given both as a factor and as a code: give only one");
   }
   return {};
 }
@@ -39,9 +39,9 @@ void warn_of_order(const std::vector<std::string>& flips, const CameraFormat& fo
                    std::vector<std::string>& warnings) {
   if (format.raw.layout != SensorLayout::bayer) return;
   for (const std::string& flip : flips) {
-    warnings.push_back("the driver does not say that its " + flip +
-                       " changes the order of the mosaic: that of its format is taken; if colours are wrong, leave "
-                       "the flip off");
+    warnings.push_back(
+        "the driver does not state that its " + flip +
+        " changes the order of the mosaic: the order of its format is used; if colours are wrong, do not use the flip");
   }
 }
 

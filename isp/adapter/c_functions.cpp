@@ -135,7 +135,7 @@ int lowlux_stage_open(const lowlux_stage_settings* settings, lowlux_stage** stag
   own.most_denoise = LOWLUX_STAGE_LEVEL_DRAFT;
   own.tone = 1;
   if (settings != nullptr && !take(settings, own)) {
-    copy_message("the size of the settings is not that of any version", message, message_size);
+    copy_message("the size of the settings struct does not match any version", message, message_size);
     return LOWLUX_STAGE_BAD_ARGUMENT;
   }
   try {
@@ -155,7 +155,7 @@ int lowlux_stage_configure(lowlux_stage* stage, const lowlux_stage_input* in, lo
   lowlux_stage_input input{};
   lowlux_stage_output output{};
   if (!take(in, input) || !take(out, output)) {
-    return own.say(LOWLUX_STAGE_BAD_ARGUMENT, "a struct is missing, or its size is not that of any version");
+    return own.say(LOWLUX_STAGE_BAD_ARGUMENT, "a struct is missing, or its size does not match any version");
   }
   try {
     const auto configured = own.configure(input, output);
@@ -179,7 +179,7 @@ int lowlux_stage_process(lowlux_stage* stage, const lowlux_stage_source* in, con
   known.size = sizeof known;
   if (in == nullptr || !take(out, picture) || (params != nullptr && !take(params, known)) ||
       !is_null_or_whole(result) || !is_null_or_whole(statistics)) {
-    return own.say(LOWLUX_STAGE_BAD_ARGUMENT, "a struct is missing, or its size is not that of any version");
+    return own.say(LOWLUX_STAGE_BAD_ARGUMENT, "a struct is missing, or its size does not match any version");
   }
   lowlux_stage_result told{};
   lowlux_stage_statistics counted{};

@@ -192,7 +192,7 @@ Result<int> Stage::configure(const lowlux_stage_input& in, lowlux_stage_output& 
   stream_.reset();
   history_.reset();
   const auto format = stage_input(in.api, in.fourcc, in.modifier);
-  if (!format) return fail(ErrorCode::unsupported, "the input is not a raw format that lowlux reads");
+  if (!format) return fail(ErrorCode::unsupported, "the input is not in a raw format that lowlux reads");
   const auto kind = stage_output(out.fourcc);
   if (!kind) return fail(ErrorCode::unsupported, "the output is not a format that lowlux writes");
   if (*kind == StageOutput::mosaic && format->layout != SensorLayout::bayer) {

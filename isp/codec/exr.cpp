@@ -227,13 +227,13 @@ Result<std::array<const char*, 3>> colour_channels(const Imf::ChannelList& chann
     return fail(ErrorCode::unsupported, "the OpenEXR file has neither R, G, B nor Y channels");
   }
   if (!rgb && channels.findChannel("RY") != nullptr) {
-    return fail(ErrorCode::unsupported, "luminance-chroma OpenEXR files are not read: convert to RGB first");
+    return fail(ErrorCode::unsupported, "luminance-chroma OpenEXR files are not supported: convert to RGB first");
   }
   const std::array<const char*, 3> names = rgb ? colour_names : std::array<const char*, 3>{"Y", "Y", "Y"};
   for (const char* name : names) {
     const Imf::Channel& channel = channels[name];
     if (channel.xSampling != 1 || channel.ySampling != 1) {
-      return fail(ErrorCode::unsupported, "subsampled OpenEXR channels are not read");
+      return fail(ErrorCode::unsupported, "subsampled OpenEXR channels are not supported");
     }
   }
   return names;
@@ -389,7 +389,7 @@ Result<void> check_exr_header(std::span<const std::byte> bytes) {
   if (reader.u32() != magic) return fail(ErrorCode::malformed, "not an OpenEXR file: its first bytes are wrong");
   const std::uint32_t version = reader.u32().value_or(0);
   if ((version & (not_image_flag | multi_part_flag)) != 0) {
-    return fail(ErrorCode::unsupported, "deep OpenEXR files and those of several parts are not read");
+    return fail(ErrorCode::unsupported, "deep and multi-part OpenEXR files are not supported");
   }
   while (true) {
     const auto name = reader.name();

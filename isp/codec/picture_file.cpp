@@ -9,7 +9,7 @@ namespace lowlux::isp {
 Result<void> check_size(std::int64_t width, std::int64_t height, const DecodeLimits& limits) {
   constexpr std::int64_t max_side = (std::int64_t{1} << 30) / 3;  // 3 samples per pixel fit an int
   const std::string size = std::to_string(width) + " x " + std::to_string(height);
-  if (width < 1 || height < 1) return fail(ErrorCode::malformed, "a picture of " + size + " pixels has no content");
+  if (width < 1 || height < 1) return fail(ErrorCode::malformed, "an image of " + size + " pixels has no content");
   if (width > max_side || height > max_side || width > limits.max_pixels / height) {
     return fail(ErrorCode::too_large,
                 "the file says " + size + " pixels, the limit is " + std::to_string(limits.max_pixels));

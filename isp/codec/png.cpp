@@ -26,7 +26,7 @@ struct Source {
 
 void read_bytes(png_structp png, png_bytep out, std::size_t count) {
   auto* source = static_cast<Source*>(png_get_io_ptr(png));
-  if (count > source->left.size()) png_error(png, "the file ends in the middle of the picture");
+  if (count > source->left.size()) png_error(png, "the file ends in the middle of the image");
   std::memcpy(out, source->left.data(), count);
   source->left = source->left.subspan(count);
 }
@@ -294,7 +294,7 @@ Result<void> write_pixels(const Encoded<Code>& picture, Executor& executor, std:
     });
     for (int i = 0; i < count; ++i) {
       const auto deflated = std::as_bytes(compressor[i].deflated());
-      if (deflated.empty()) return fail(ErrorCode::too_large, "no memory to compress the picture");
+      if (deflated.empty()) return fail(ErrorCode::too_large, "no memory to compress the image");
       adler = adler32_combine(adler, compressor[i].adler(), static_cast<z_off_t>(compressor[i].filtered_size()));
       chunk.insert(chunk.end(), deflated.begin(), deflated.end());
       if (done + i + 1 == stretches) put_u32(static_cast<std::uint32_t>(adler), chunk);
@@ -314,7 +314,7 @@ Result<void> encode(const Encoded<Code>& picture, const FileMetadata& metadata, 
         .and_then([&] { return write_pixels(picture, executor, file); })
         .and_then([&] { return write_chunk("IEND", {}, file); });
   } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::too_large, "no memory to compress the picture");
+    return fail(ErrorCode::too_large, "no memory to compress the image");
   }
 }
 

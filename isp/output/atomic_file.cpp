@@ -66,7 +66,7 @@ Result<void> check_target(const std::string& path, Overwrite overwrite) {
     return fail(ErrorCode::unwritable, path + " is a directory: name a file in it", path);
   }
   if (!S_ISREG(found.st_mode) && !S_ISLNK(found.st_mode)) {
-    return fail(ErrorCode::unwritable, path + " is not a regular file: pictures are written to files only", path);
+    return fail(ErrorCode::unwritable, path + " is not a regular file: images are written to files only", path);
   }
   if (overwrite == Overwrite::no) return taken(path);
   return {};

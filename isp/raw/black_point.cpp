@@ -96,7 +96,7 @@ Result<BlackPoint> requested_black(const RawDn& raw, const BlackRequest& request
   if (request.choice == BlackChoice::measured) {
     if (request.measured) return *request.measured;
     return fail(ErrorCode::invalid_argument,
-                "a measured black level is requested, but none is given: use a profile that has one, or --black DN");
+                "a measured black level is requested, but the profile has none: use another profile, or --black DN");
   }
   if (request.choice == BlackChoice::metadata) return tagged_black(raw, request, "");
   // A tag that is finer than four figures is not replaced with four figures.

@@ -115,7 +115,7 @@ TEST(WeighDarks, BeyondTheDarksThereIsAWarningAndBeyondFourTimesNothing) {
   EXPECT_TRUE(warned(20));
   EXPECT_TRUE(warned(0.5));  // below the shortest, and no bias frames
   EXPECT_EQ(refusal({{1, 20}, {10, 20}}, {39.9, 20}), "");
-  EXPECT_NE(refusal({{1, 20}, {10, 20}}, {40.1, 20}).find("at most 4 times"), std::string::npos);
+  EXPECT_NE(refusal({{1, 20}, {10, 20}}, {40.1, 20}).find("more than the limit of 4 times"), std::string::npos);
   EXPECT_NE(refusal({{0, 20}}, {1, 20}), "");
   EXPECT_NE(refusal({}, {1, 20}).find("no dark frames"), std::string::npos);
 }

@@ -310,7 +310,8 @@ TEST(DarkFrame, SaturatedDarksAndRequestsOutOfRangeAreRefused) {
   EXPECT_NE(refusal(bright, bright.frame({4, 20}, 1)).find("saturated"), std::string::npos);
   const RawDn picture = picture_of(small, {4, 20}, 20);
   for (const double share : {0.0, -1.0, 1.1, std::nan("")}) {
-    EXPECT_NE(refusal(small, picture, {.noise_fraction = share}).find("fraction of noise"), std::string::npos) << share;
+    EXPECT_NE(refusal(small, picture, {.noise_fraction = share}).find("fraction of variance"), std::string::npos)
+        << share;
   }
   EXPECT_NE(refusal(small, picture, {.doubling_c = 1}).find("doubling"), std::string::npos);
   EXPECT_FALSE(make_dark_frame({}, picture, {}));

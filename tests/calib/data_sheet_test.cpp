@@ -200,9 +200,10 @@ TEST(DataSheet, DarkCurrentStandsInForMissingDarks) {
   ASSERT_TRUE(sheet) << sheet.error().message;
   expect_efficiency(*sheet);
   ASSERT_EQ(sheet->warnings.size(), 1u);
-  EXPECT_EQ(sheet->warnings[0],
-            "PRNU contains the nonuniformity of dark current: there are no two darks of the flats' 3.2 s at 20 C; take "
-            "16 darks of the exposure time of the flats near half of saturation");
+  EXPECT_EQ(
+      sheet->warnings[0],
+      "the non-uniformity of dark current is not subtracted from PRNU, because two darks of the flats' 3.2 s at 20 "
+      "C are missing; take 16 darks of the exposure time of the flats near half of saturation");
 }
 
 TEST(DataSheet, FiguresThatContainDarkCurrentAreWarnedOf) {
@@ -212,7 +213,7 @@ TEST(DataSheet, FiguresThatContainDarkCurrentAreWarnedOf) {
   const auto few = make_data_sheet(frames);
   ASSERT_TRUE(few) << few.error().message;
   ASSERT_EQ(few->warnings.size(), 2u);
-  EXPECT_EQ(few->warnings[1].find("quantum efficiency contains dark current"), 0u) << few->warnings[1];
+  EXPECT_EQ(few->warnings[1].find("dark current is not subtracted for the quantum efficiency"), 0u) << few->warnings[1];
   // 30 e-/s of dark current next to 1600 e-/s of light.
   EXPECT_GT((*few->quantum_efficiency)[1].value, efficiency * 1.015);
   // Darks of the flats' time, but 3 degrees warmer, are those of another dark current.

@@ -85,7 +85,7 @@ TEST(PictureNoise, RefusesWhatIsTooSmall) {
   const auto constant = [](int, int) { return 100; };
   for (const int side : {0, 1, 2, 30, 60}) {
     expect_refused(fit(test::bayer_frame(side, side, BayerPhase::rggb, constant), 0), ErrorCode::insufficient,
-                   "larger picture");
+                   "larger image");
   }
 }
 
@@ -103,7 +103,7 @@ TEST(PictureNoise, RefusesOneLevel) {
 }
 
 TEST(PictureNoise, RefusesAVarianceBelowZeroWithoutLight) {  // as a black level 40 DN too low makes it: 6 - 0.8 * 40
-  expect_refused(fit(stairs(1024, 0.8, 6, 100, white_noise), 60), ErrorCode::insufficient, "below 0");
+  expect_refused(fit(stairs(1024, 0.8, 6, 100, white_noise), 60), ErrorCode::insufficient, "is negative");
 }
 
 TEST(PictureNoise, RefusesTextureWithoutFlatParts) {

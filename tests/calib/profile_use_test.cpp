@@ -212,7 +212,7 @@ TEST(ProfileUse, BeyondTheGainsTheIsoCountsAndItSaysSo) {
   const auto found = profile_at(two_gains(), frame(1600, 0, 20));
   ASSERT_TRUE(found);
   ASSERT_EQ(found->warnings.size(), 1U);
-  EXPECT_NE(found->warnings[0].find("ISO 1600 lies beyond the profile's (100, 400)"), std::string::npos);
+  EXPECT_NE(found->warnings[0].find("ISO 1600 is outside the range of the profile (100, 400)"), std::string::npos);
   EXPECT_NEAR(found->sensor->system_gain_dn_per_e, 16, 1e-12);
   EXPECT_NEAR(found->sensor->full_well_e, (16383 - 516) / 16.0, 1e-9);
   const auto below = profile_at(two_gains(), frame(50, 0, 20));
@@ -229,7 +229,7 @@ TEST(ProfileUse, ExtrapolationInTimeAndTemperatureIsSaid) {
   };
   EXPECT_TRUE(warnings(10, 30).empty());
   ASSERT_EQ(warnings(20, 30).size(), 1U);
-  EXPECT_NE(warnings(20, 30)[0].find("longer than the profile's darks, 0 to 10 s"), std::string::npos);
+  EXPECT_NE(warnings(20, 30)[0].find("longer than those of the darks of the profile, 0 to 10 s"), std::string::npos);
   ASSERT_EQ(warnings(10, 40).size(), 1U);
   EXPECT_NE(warnings(10, 40)[0].find("15 to 30 C"), std::string::npos);
   EXPECT_EQ(warnings(10, std::nullopt).size(), 1U);

@@ -111,15 +111,15 @@ TEST(BadInput, TextInOneLineIsTextUnlessItIsARaw) {
 
 TEST(BadInput, WhatIsNotARawIsCalledWhatItIs) {
   EXPECT_TRUE(has(refused(bytes_of("Dear reader,\nthis is a letter and no photograph.\n")), "this is text"));
-  EXPECT_TRUE(has(refused(bytes_of("\xFF\xD8\xFF\xE0 and so on")), "a JPEG picture"));
-  EXPECT_TRUE(has(refused(bytes_of("\x89PNG\r\n\x1a\n")), "a PNG picture"));
+  EXPECT_TRUE(has(refused(bytes_of("\xFF\xD8\xFF\xE0 and so on")), "a JPEG image"));
+  EXPECT_TRUE(has(refused(bytes_of("\x89PNG\r\n\x1a\n")), "a PNG image"));
   DngBuilder picture;
   picture.samples = 3;
   picture.bits = 8;
   picture.set(262, Tag::numbers(TagType::u16, {2}));
   EXPECT_TRUE(has(refused(picture), "contains no raw image"));
   picture.remove(50706).remove(50707);
-  EXPECT_TRUE(has(refused(picture), "a TIFF picture"));
+  EXPECT_TRUE(has(refused(picture), "a TIFF image"));
 }
 
 TEST(BadInput, AFileIsTextOnlyIfMoreThanItsFirstRowsCanBePrinted) {

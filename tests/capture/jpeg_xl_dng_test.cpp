@@ -140,7 +140,7 @@ TEST(JpegXlDng, WhatCannotBeDecodedIsRefusedWithTheReason) {
   cut.resize(cut.size() / 2);
   EXPECT_TRUE(has(with_part(cut), "from column 32, row 32 on does not decode: it"));
   EXPECT_TRUE(has(with_part(std::vector<std::byte>(100)), "not JPEG XL"));
-  EXPECT_TRUE(has(with_part(test::jpeg_xl_of(Plane<std::uint16_t>(16, 32), 1, 12)), "another size"));
+  EXPECT_TRUE(has(with_part(test::jpeg_xl_of(Plane<std::uint16_t>(16, 32), 1, 12)), "size of its tile"));
   EXPECT_TRUE(has(with_part(test::jpeg_xl_of(Plane<std::uint16_t>(96, 32), 3, 12)), "channels"));
   DngBuilder few = good.dng;
   few.stored_parts.pop_back();

@@ -130,7 +130,7 @@ TEST(ReadPicture, ATwentiethOfTheLightIsTheMostThatIsClipped) {
   // One sample of -v among 5999 of 0.5.
   const float limit = 0.05F / 0.95F * 0.5F * 5999;
   EXPECT_TRUE(read(exr_of(mostly_half(-0.999F * limit))));
-  EXPECT_TRUE(has(refused(exr_of(mostly_half(-1.001F * limit))), "clip the picture at 0 if that is meant"));
+  EXPECT_TRUE(has(refused(exr_of(mostly_half(-1.001F * limit))), "clip the image at 0 if that is meant"));
 }
 
 TEST(ReadPicture, FlippedBitsAreAnErrorOrAFinitePicture) {

@@ -163,7 +163,7 @@ TEST(WritePicture, PfmHoldsTheFloatsAndNothingElse) {
   EXPECT_TRUE(test::same_bits(test::noisy_linear(80, 60), std::get<SceneLinear>(decoded->picture)));
   const auto codes = write({"", codes8, OutputSpace::srgb}, scratch.file("b.pfm"));
   ASSERT_FALSE(codes);
-  EXPECT_NE(codes.error().message.find("PFM files hold floats, the picture is 8-bit"), std::string::npos);
+  EXPECT_NE(codes.error().message.find("PFM files hold floats, the image is 8-bit"), std::string::npos);
   EXPECT_FALSE(scratch.holds("b.pfm"));
 }
 
@@ -295,7 +295,7 @@ TEST(CheckWritable, FormatsHoldTheSamplesTheyCan) {
 TEST(CheckWritable, RefusalsSayWhatWouldDo) {
   const auto exr = check_writable(FileFormat::exr, SampleType::u8, OutputSpace::linear_srgb);
   ASSERT_FALSE(exr);
-  EXPECT_EQ(exr.error().message, "OpenEXR files hold floats, the picture is 8-bit");
+  EXPECT_EQ(exr.error().message, "OpenEXR files hold floats, the image is 8-bit");
   const auto curve = check_writable(FileFormat::tiff, SampleType::f32, OutputSpace::srgb);
   ASSERT_FALSE(curve);
   EXPECT_NE(curve.error().message.find("linear-srgb"), std::string::npos);

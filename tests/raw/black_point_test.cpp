@@ -193,7 +193,7 @@ TEST(BlackPoint, AMeasuredLevelThatIsMissingIsAnError) {
   const auto black = choose_black(frame_with_masked_columns(2), {.choice = BlackChoice::measured});
   ASSERT_FALSE(black);
   EXPECT_EQ(black.error().code, ErrorCode::invalid_argument);
-  EXPECT_NE(black.error().message.find("none is given"), std::string::npos);
+  EXPECT_NE(black.error().message.find("the profile has none"), std::string::npos);
 }
 
 TEST(BlackPoint, MetadataTakesTheTagWithItsFractions) {

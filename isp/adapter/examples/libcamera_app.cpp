@@ -133,7 +133,7 @@ int stream_frames(libcamera::Camera& camera, libcamera::CameraConfiguration& con
                   const char* picture_name) {
   const libcamera::StreamConfiguration& format = configuration.at(0);
   lowlux_stage_format_info info{};
-  if (!is_raw(format.pixelFormat, info)) return failed("the raw stream became another one");
+  if (!is_raw(format.pixelFormat, info)) return failed("the format of the raw stream changed");
 
   lowlux_stage_settings settings{};
   settings.size = sizeof settings;
@@ -179,11 +179,11 @@ int stream_frames(libcamera::Camera& camera, libcamera::CameraConfiguration& con
   }
   Completed completed;
   camera.requestCompleted.connect(&completed, [&](libcamera::Request* request) { completed.add(request); });
-  int code = camera.start() < 0 ? failed("the camera does not start") : 0;
+  int code = camera.start() < 0 ? failed("the camera cannot be started") : 0;
   for (const auto& request : requests) camera.queueRequest(request.get());
   for (int done = 0, failed_in_turn = 0; done < frames && code == 0;) {
     libcamera::Request* const request = completed.next();
-    if (request == nullptr) code = failed("no frame came for five seconds");
+    if (request == nullptr) code = failed("no frame arrived for five seconds");
     if (request == nullptr || request->status() == libcamera::Request::RequestCancelled) break;
     const libcamera::FrameBuffer* const buffer = request->buffers().begin()->second;
     if (buffer->metadata().status == libcamera::FrameMetadata::FrameSuccess) {
@@ -197,7 +197,7 @@ int stream_frames(libcamera::Camera& camera, libcamera::CameraConfiguration& con
       ++done;
       failed_in_turn = 0;
     } else if (++failed_in_turn == most_failed_in_turn) {
-      code = failed("the camera gives damaged frames only");
+      code = failed("the camera delivers only damaged frames");
     }
     request->reuse(libcamera::Request::ReuseBuffers);
     camera.queueRequest(request);
@@ -216,7 +216,7 @@ int with_camera(libcamera::Camera& camera, int frames, const char* picture_name)
     return failed("this camera offers no raw stream");
   }
   if (configuration->validate() == libcamera::CameraConfiguration::Invalid) return failed("no valid configuration");
-  if (camera.configure(configuration.get()) < 0) return failed("the camera takes no configuration");
+  if (camera.configure(configuration.get()) < 0) return failed("the camera rejects the configuration");
   return stream_frames(camera, *configuration, frames, picture_name);
 }
 
@@ -225,14 +225,14 @@ int with_camera(libcamera::Camera& camera, int frames, const char* picture_name)
 int main(int argc, char** argv) {
   const int frames = argc > 1 ? std::max(1, static_cast<int>(std::strtol(argv[1], nullptr, 10))) : 30;
   libcamera::CameraManager manager;
-  if (manager.start() < 0) return failed("libcamera does not start");
+  if (manager.start() < 0) return failed("libcamera cannot be started");
   int code = 1;
   {
     const auto cameras = manager.cameras();
     if (cameras.empty()) {
       failed("there is no camera");
     } else if (cameras[0]->acquire() < 0) {
-      failed("the camera is another program's");
+      failed("the camera is used by another program");
     } else {
       code = with_camera(*cameras[0], frames, argc > 2 ? argv[2] : nullptr);
       cameras[0]->release();

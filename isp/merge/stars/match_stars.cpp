@@ -189,8 +189,8 @@ Result<StarMatch> match_stars(const StarField& reference, const StarField& frame
     return too_few(reference, frame, consensus ? consensus->matched : 0);
   if (consensus->log10_rival_probability < max_rival * consensus->log10_false_probability) {
     return fail(ErrorCode::insufficient,
-                fmt::format("{} of {} stars match the reference in one way, and about as many in another: their "
-                            "pattern repeats, so it does not determine the displacement of the frame",
+                fmt::format("{} of {} stars match the reference at one displacement, and about as many at another: the "
+                            "pattern of stars repeats and does not determine the displacement",
                             consensus->matched, frame.stars.size()));
   }
   Refinement refinement(reference, frame);

@@ -131,7 +131,7 @@ Result<Xy> white_at_weight(const CameraColour& colour, const Bracket& bracket, d
   const auto xy = xy_of(xyz_of(*to_xyz * neutral));
   if (!xy || !xyz_of(*xy) || !uv_prime_of(*xy)) {
     return fail(ErrorCode::malformed,
-                "neutral " + text_of(neutral) + " is no colour a light can have under the file's colour matrices",
+                "neutral " + text_of(neutral) + " is not the colour of a light under the colour matrices of the file",
                 "AsShotNeutral");
   }
   return *xy;
@@ -164,7 +164,7 @@ Result<Xy> iterate_white(const CameraColour& colour, const Vector3& neutral) {
 Result<Calibration> calibration_at(const CameraColour& colour, const Xy& scene_white) {
   if (auto fault = fault_of(colour)) return tl::make_unexpected(*std::move(fault));
   if (!xyz_of(scene_white) || !uv_prime_of(scene_white)) {
-    return fail(ErrorCode::malformed, "a scene white of " + text_of(scene_white) + " is no colour a light can have",
+    return fail(ErrorCode::malformed, "a scene white of " + text_of(scene_white) + " is not the colour of a light",
                 "white");
   }
   const Bracket bracket = bracket_of(colour);
@@ -190,7 +190,7 @@ Result<Matrix3> to_xyz_by_forward(const Calibration& calibration, const Vector3&
   if (!forward) return forward;
   const Vector3 reference = *to_reference * neutral;
   if (!is_positive(reference)) {
-    return fail(ErrorCode::malformed, "neutral " + text_of(neutral) + " is no neutral of the reference camera",
+    return fail(ErrorCode::malformed, "neutral " + text_of(neutral) + " is not a neutral of the reference camera",
                 "CameraCalibration");
   }
   return *forward * diagonal3({1 / reference[0], 1 / reference[1], 1 / reference[2]}) * *to_reference;
@@ -208,7 +208,7 @@ Result<Vector3> neutral_at(const Calibration& calibration, const Xy& scene_white
   if (!is_positive(rgb)) {
     return fail(ErrorCode::malformed,
                 "a white of " + text_of(scene_white) + " gives camera RGB " + text_of(rgb) +
-                    ", which no sensor can measure: the file's colour matrices do not suit this light",
+                    ", which a sensor cannot measure: the colour matrices of the file are not valid for this light",
                 "ColorMatrix");
   }
   const double largest = *std::max_element(rgb.begin(), rgb.end());

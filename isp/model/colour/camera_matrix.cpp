@@ -169,7 +169,7 @@ Result<SpectralMatrix> spectral_matrix(const std::array<Spectrum, 3>& sensitivit
   const double condition = solved ? svd.singularValues()[0] / svd.singularValues()[2] : HUGE_VAL;
   if (!(condition <= worst_condition_number)) {
     return fail(ErrorCode::insufficient,
-                "the sensitivities see fewer than three dimensions of colour: C T^t has the condition number " +
+                "the sensitivities do not distinguish three dimensions of colour: C T^t has the condition number " +
                     number_text(condition));
   }
   const Eigen::Matrix3d m = tt * svd.solve(Eigen::Matrix3d::Identity());

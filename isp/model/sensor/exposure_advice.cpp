@@ -174,11 +174,10 @@ Result<ExposureAdvice> advise_exposure(const AdviceRequest& request) {
     }
     out.gains.push_back(best_of(request, i));
     if (!out.gains.back().at.midtone) {
-      return fail(
-          ErrorCode::invalid_argument,
-          "the mid tone has no chromaticity: the matrix takes it to an X + Y + Z that is not positive; give the "
-          "colours of this camera",
-          gain.name);
+      return fail(ErrorCode::invalid_argument,
+                  "the mid tone has no chromaticity, because X + Y + Z is not positive by the matrix; give the colours "
+                  "of this camera",
+                  gain.name);
     }
   }
   const std::vector<double> losses = losses_db(out.gains);
@@ -254,12 +253,12 @@ std::string limit_text(const AdviceRequest& r, const ExposureAdvice& advice) {
     case ExposureLimit::full_well:
       break;
   }
-  return "the highlight fills the pixels after " + time;
+  return "the highlight reaches the full well after " + time;
 }
 
 std::string higher_text(const AdviceRequest& r, const ExposureAdvice& advice, const std::vector<double>& losses_db) {
   const auto higher = neighbour(r, advice.best, true);
-  if (!higher) return r.gains.size() > 1 ? "no higher gain reads with less noise" : "";
+  if (!higher) return r.gains.size() > 1 ? "no higher gain has less read noise" : "";
   const bool sooner = advice.gains[*higher].at.exposure_s < advice.gains[advice.best].at.exposure_s;
   const std::string& name = r.gains[*higher].name;
   const double lost_db = losses_db[*higher] - losses_db[advice.best];
@@ -294,11 +293,12 @@ Result<void> check_request(const AdviceRequest& r) {
   }
   if (auto good = check_exposure({r.longest_exposure_s, r.temperature_c}); !good) return good;
   if (!(r.patch_pixels >= 1) || !(r.patch_pixels <= 1e12)) {
-    return wrong("a patch has 1 to 1e12 pixels, found " + text_of(r.patch_pixels));
+    return wrong("a patch must have 1 to 1e12 pixels, found " + text_of(r.patch_pixels));
   }
-  if (r.frames < 1 || r.frames > 1000000) return wrong("1 to 1000000 frames are averaged, found " + text_of(r.frames));
+  if (r.frames < 1 || r.frames > 1000000)
+    return wrong("the number of frames must be 1 to 1000000, found " + text_of(r.frames));
   if (r.curve_points < 2 || r.curve_points > 10000) {
-    return wrong("a curve has 2 to 10000 points, found " + text_of(r.curve_points));
+    return wrong("a curve must have 2 to 10000 points, found " + text_of(r.curve_points));
   }
   for (const Vector3& row : r.camera_to_xyz) {
     if (!std::ranges::all_of(row, [](double value) { return std::isfinite(value); })) {

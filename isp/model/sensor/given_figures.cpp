@@ -25,11 +25,11 @@ Result<void> check_given_figures(const SensorFigures& given, const NamedSensor& 
   constexpr const char* no_glow = "the sensor has no amplifier glow";
   const Useless options[] = {
       {positive(given.hot_pixel_fraction) && m.hot_pixel_current_e_per_s == 0, "--hot-pixels", "--hot-current",
-       "hot pixels differ from others by their dark current"},
+       "hot pixels are pixels with a larger dark current"},
       {positive(given.hot_pixel_current_e_per_s) && m.hot_pixel_fraction == 0, "--hot-current", "--hot-pixels",
        "the sensor has no hot pixels"},
       {positive(given.telegraph_fraction) && m.telegraph_e == 0, "--telegraph-pixels", "--telegraph-noise",
-       "its pixels differ from others by their two levels"},
+       "telegraph pixels have two levels"},
       {positive(given.telegraph_e) && m.telegraph_fraction == 0, "--telegraph-noise", "--telegraph-pixels",
        "no pixel of the sensor has telegraph noise"},
       {given.glow_position && m.glow_e_per_s == 0, "--glow-position", "--glow", no_glow},

@@ -106,14 +106,14 @@ Result<void> check_sensor(const SensorModel& s) {
   if (!(s.system_gain_dn_per_e > 0) || !(s.system_gain_dn_per_e <= 1e6)) {
     return wrong("the system gain must be above 0 and at most 1e6 DN/e-, found " + six_digits(s.system_gain_dn_per_e));
   }
-  if (s.bits < 1 || s.bits > 16) return wrong("a converter has 1 to 16 bits, found " + std::to_string(s.bits));
+  if (s.bits < 1 || s.bits > 16) return wrong("the converter must have 1 to 16 bits, found " + std::to_string(s.bits));
   const double largest_code = (1 << s.bits) - 1;
   if (!(s.black_level_dn >= 0) || !(s.white_level_dn <= largest_code) || !(s.black_level_dn < s.white_level_dn)) {
     return wrong("black and white level must be 0 <= black < white <= " + six_digits(largest_code) + ", found " +
                  six_digits(s.black_level_dn) + " and " + six_digits(s.white_level_dn));
   }
   if (s.white_level_dn != std::floor(s.white_level_dn)) {
-    return wrong("the white level is a code, a whole number, found " + six_digits(s.white_level_dn));
+    return wrong("the white level must be a whole number, found " + six_digits(s.white_level_dn));
   }
   if (!(s.full_well_e > 0) || !(s.full_well_e <= largest_full_well_e)) {
     return wrong("the full well must be above 0 and at most 990000 e-, found " + six_digits(s.full_well_e));

@@ -66,7 +66,7 @@ Result<Spectrum> photon_radiance(const Spectrum& radiance) {
 Result<Spectrum> normalised(const Spectrum& power) {
   if (const auto wrong = not_a_light(power, "a spectral power")) return *wrong;
   const double largest = std::ranges::max(power.values());
-  if (!(largest > 0)) return fail(ErrorCode::insufficient, "a spectrum without power has no shares: all values are 0");
+  if (!(largest > 0)) return fail(ErrorCode::insufficient, "the power of a spectrum must not be 0 at all wavelengths");
   // The values are divided by the largest first: the integral of values near the limits of double would exceed them.
   std::vector<double> shares(power.values().begin(), power.values().end());
   for (double& share : shares) share /= largest;
@@ -94,7 +94,7 @@ Result<PhotonMeans> mean_photons(const Spectrum& power, double power_w, double e
     out.photons.push_back(energy_j / photon_energy_j(out.wavelengths_nm[i]));
     if (!std::isfinite(out.photons.back())) {
       return fail(ErrorCode::invalid_argument, "the photons of " + number_text(power_w) + " W in " +
-                                                   number_text(exposure_s) + " s are beyond what can be counted");
+                                                   number_text(exposure_s) + " s are too many photons to count");
     }
   }
   return out;

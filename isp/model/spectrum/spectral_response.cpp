@@ -64,7 +64,7 @@ Result<void> check_figures(const NamedSensor& sensor, const Optics& optics) {
     return wrong("an ISO speed lies between 0.001 and 1e9");
   }
   if (const auto white = optics.white_luminance_cd_m2; white && (!(*white > 0) || !(*white <= 1e12))) {
-    return wrong("the luminance that fills a pixel must lie above 0 and below 1e12 cd/m2");
+    return wrong("the luminance that reaches full well must lie above 0 and below 1e12 cd/m2");
   }
   return {};
 }
@@ -74,7 +74,7 @@ tl::unexpected<Error> no_scale(const NamedSensor& sensor) {
   if (!sensor.peak_quantum_efficiency) missing += missing.empty() ? "--peak-qe" : " and --peak-qe";
   return fail(ErrorCode::insufficient,
               "no source states how much light the sensor " + sensor.model.name + " needs; give " + missing +
-                  ", or --iso, or --white-luminance (the luminance that fills a pixel in 1 s)");
+                  ", or --iso, or --white-luminance (the luminance that reaches full well in 1 s)");
 }
 
 }  // namespace

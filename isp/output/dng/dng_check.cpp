@@ -21,7 +21,7 @@ constexpr double smallest_coefficient = 1e-9;  // rationals hold 4.7e-10 as the 
 constexpr double smallest_gain = 1e-4;
 
 tl::unexpected<Error> cannot(const char* tag, const std::string& why) {
-  return fail(ErrorCode::invalid_argument, std::string("a DNG cannot hold this ") + tag + ": " + why);
+  return fail(ErrorCode::invalid_argument, std::string("a DNG cannot store this ") + tag + ": " + why);
 }
 
 std::string text_of(const Rect& r) {
@@ -48,7 +48,7 @@ Result<void> check_geometry(const RawDn& raw) {
   const int samples = samples_of(raw.layout);
   if (raw.samples() == 0 || raw.row_samples() % samples != 0) {
     return cannot("image", std::to_string(raw.row_samples()) + " x " + std::to_string(raw.rows()) +
-                               " samples are no pixels of " + std::to_string(samples) + " samples");
+                               " samples do not fill whole pixels of " + std::to_string(samples) + " samples");
   }
   if (raw.is_float() && !raw.dn.empty()) return cannot("image", "it has both codes and floating-point samples");
   const int width = raw.row_samples() / samples, height = raw.rows();
@@ -110,7 +110,7 @@ Result<void> check_white(const RawDn& raw) {
     }
     if (raw.layout != SensorLayout::linear_rgb && white != raw.white_dn[0]) {
       return cannot("WhiteLevel",
-                    "a mosaic has one, found " + number_text(raw.white_dn[0]) + " and " + number_text(white));
+                    "a mosaic has one channel, found " + number_text(raw.white_dn[0]) + " and " + number_text(white));
     }
   }
   if (!raw.black_tag) return {};
@@ -159,7 +159,7 @@ Result<void> check_colour(const CameraColour& colour) {
     return cannot("AsShotNeutral", "expected 0.0001 to 1000");
   }
   if (const auto& xy = colour.as_shot_white_xy; xy && !((*xy)[0] > 0 && (*xy)[1] > 0 && (*xy)[0] + (*xy)[1] < 1)) {
-    return cannot("AsShotWhiteXY", "it is no chromaticity");
+    return cannot("AsShotWhiteXY", "it is not a chromaticity");
   }
   return {};
 }
@@ -201,7 +201,7 @@ Result<void> check_corrections(const RawFrame& frame) {
   for (const RadialGain& r : c.radial_gains) {
     const bool finite = std::all_of(std::begin(r.k), std::end(r.k), [](double k) { return std::isfinite(k); });
     if (!finite || !within(r.centre_x, 0, 1) || !within(r.centre_y, 0, 1)) {
-      return cannot("FixVignetteRadial", "expected finite figures and a centre in the picture");
+      return cannot("FixVignetteRadial", "expected finite figures and a centre in the image");
     }
   }
   const Rect& active = frame.raw.active;

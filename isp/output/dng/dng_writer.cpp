@@ -238,7 +238,7 @@ Result<void> encode(const RawFrame& frame, const DngWriteOptions& options, std::
 Result<void> check_baseline_exposure(double ev) {
   if (std::fabs(ev) <= max_baseline_exposure_ev) return {};
   return fail(ErrorCode::invalid_argument,
-              "a DNG cannot hold this BaselineExposure: " + number_text(ev) + " EV, expected -100 to 100");
+              "a DNG cannot store this BaselineExposure: " + number_text(ev) + " EV, expected -100 to 100");
 }
 
 /// Returns an error if raw developers do not read frames of this size. LibRaw, and with it capture::read_raw for codes,

@@ -149,11 +149,11 @@ bool supported(FileFormat format, SampleType type) {
 Result<void> check_writable(FileFormat format, SampleType type, OutputSpace space) {
   if (!supported(format, type)) {
     return fail(ErrorCode::invalid_argument, std::string(name_of(format)) + " files hold " + samples_held(format) +
-                                                 ", the picture is " + name_of(type));
+                                                 ", the image is " + name_of(type));
   }
   if (type == SampleType::f32 && !is_linear(space)) {
     return fail(ErrorCode::invalid_argument,
-                "float pictures are scene-linear: choose a linear space (linear-srgb, linear-rec2020, xyz, camera)");
+                "float images are scene-linear: choose a linear space (linear-srgb, linear-rec2020, xyz, camera)");
   }
   return {};
 }
@@ -195,14 +195,14 @@ Result<std::vector<std::byte>> png_bytes(const Encoded8& picture, OutputSpace sp
   char* bytes = nullptr;
   std::size_t size = 0;
   std::FILE* const file = open_memstream(&bytes, &size);
-  if (file == nullptr) return fail(ErrorCode::too_large, "no memory for the picture's file");
+  if (file == nullptr) return fail(ErrorCode::too_large, "no memory for the image's file");
   FileMetadata metadata;
   metadata.icc = icc_profile(space);
   const Result<void> written = encode_png(picture, metadata, executor, file);
   const bool whole = std::fclose(file) == 0;  // `bytes` is complete only after fclose
   const std::unique_ptr<char, decltype(&std::free)> owned(bytes, std::free);
   if (!written) return tl::make_unexpected(written.error());
-  if (!whole) return fail(ErrorCode::too_large, "no memory for the picture's file");
+  if (!whole) return fail(ErrorCode::too_large, "no memory for the image's file");
   const auto all = std::as_bytes(std::span(owned.get(), size));
   return std::vector<std::byte>(all.begin(), all.end());
 }

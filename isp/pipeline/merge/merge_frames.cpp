@@ -36,17 +36,15 @@ void add_up(std::vector<StageTime>& times) {
 Result<void> check_drizzling(const MergeContext& work) {
   if (!work.options.drizzle) return {};
   if (work.loader.reference().raw.layout != SensorLayout::bayer) {
-    return fail(
-        ErrorCode::unsupported,
-        "drizzling measures the three colours of a mosaic, and the frame is monochrome: merge without drizzling",
-        work.loader.reference_name());
+    return fail(ErrorCode::unsupported,
+                "drizzling needs a mosaic of three colours, and the frame is monochrome: merge without drizzling",
+                work.loader.reference_name());
   }
   if (work.out.alignment != MergeAlignment::none || work.out.bracket) return {};
   return fail(ErrorCode::invalid_argument,
-              work.count == 1
-                  ? "drizzling needs several frames"
-                  : "the frames did not move, and drizzling needs displaced ones: merge without drizzling, or state "
-                    "how they are aligned",
+              work.count == 1 ? "drizzling needs several frames"
+                              : "drizzling needs displaced frames, and these did not move: merge without drizzling, or "
+                                "name the method with --align",
               work.loader.reference_name());
 }
 
@@ -129,8 +127,8 @@ void warn_of_unknown_displacements(MergedRaw& out) {
       std::ranges::count_if(out.frames, [](const FrameUse& use) { return !use.aligned && use.used_fraction > 0; });
   if (unknown == 0) return;
   out.warnings.push_back(
-      fmt::format("the displacement of {} of {} frames could not be found: they were merged where they match the "
-                  "reference in place; another --reference may help",
+      fmt::format("the displacement of {} of {} frames could not be found: only areas that match the reference without "
+                  "displacement were merged; try another --reference",
                   unknown, out.frames.size()));
 }
 

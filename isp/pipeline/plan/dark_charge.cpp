@@ -67,7 +67,7 @@ void use(const DarkEstimate& found, const RawDn& raw, DarkCharge& out) {
   out.state = DarkCharge::State::estimated;
   out.mean_e = found.mean_e;
   out.standard_error_e = found.standard_error_e;
-  out.reason = fmt::format("the darkest blocks hold {:.3g} e- more than the colour of the light allows", found.mean_e);
+  out.reason = fmt::format("the darkest blocks have {:.3g} e- more than light of this colour explains", found.mean_e);
   for (int site = 0; site < 4; ++site) {
     out.estimated_e[site] = found.charge_e[static_cast<std::size_t>(colour_at(raw.phase, site & 1, site >> 1))];
   }
@@ -75,7 +75,7 @@ void use(const DarkEstimate& found, const RawDn& raw, DarkCharge& out) {
 }
 
 std::string refusal_of(const std::optional<DarkEstimate>& found, const FrameInfo& info) {
-  if (!found) return "the frame has no light from which dark charge could be separated";
+  if (!found) return "the frame has no coloured light from which dark charge can be separated";
   if (!found->is_significant()) {
     return fmt::format("the darkest blocks show {:.3g} e- with a standard error of {:.3g} e-: not significant",
                        found->mean_e, found->standard_error_e);
@@ -107,7 +107,7 @@ DarkCharge in_black_point(const RawFrame& frame, const RawLevels& levels) {
   }
   const std::optional<PerSite<double>> dark_dn = dark_of_black_point(frame, levels);
   if (!dark_dn || !levels.electrons_at_white) {
-    out.reason = "its size is not known without a tagged pedestal and a gain";
+    out.reason = "not known without a tagged pedestal and a gain";
     return out;
   }
   double variance_e2 = 0;
@@ -136,7 +136,7 @@ double median_of(const Plane<float>& plane) {
 DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, const Thumbnail& thumbnail,
                             const DevelopOptions& options) {
   const FrameInfo& info = frame.raw.info;
-  if (frame.raw.layout != SensorLayout::bayer) return {.reason = "not a mosaic of filters"};
+  if (frame.raw.layout != SensorLayout::bayer) return {.reason = "the sensor has no colour filters"};
   const bool is_known = levels.black.dark_mean_e != PerSite<double>{};
   if (is_known || levels.black.holds == BlackPoint::Holds::pedestal_and_dark) return in_black_point(frame, levels);
   // If a raw is denoised already, its maker knew more: `lowlux denoise` subtracts dark charge, or warns.
@@ -145,14 +145,14 @@ DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, cons
   if (!info.exposure_s) return {.reason = "the exposure time is not known"};
   DarkCharge out{.state = DarkCharge::State::not_expected};
   if (!(charge_of(high_current_e_per_s, info) >= min_charge_e)) {
-    out.reason = "the exposure was short, or the sensor cold";
+    out.reason = "the exposure was short or the sensor was cold";
     return out;
   }
   if (options.series_dark_e) {
     out.state = DarkCharge::State::estimated;
     out.charge_e = out.estimated_e = *options.series_dark_e;
     out.mean_e = mean_of_sites(out.charge_e);
-    out.reason = "as another frame of the series shows";
+    out.reason = "estimated from another frame of the series";
     return out;
   }
   if (options.estimate_dark) {

@@ -62,10 +62,9 @@ Result<void> decide_adaptation(const FrameLight& light, const DevelopOptions& op
   const Xy scene = choice.light && choice.light->white ? *choice.light->white : light.white->xy;
   const auto adaptation = incomplete_adaptation(scene, output_white, plan.adaptation_degree);
   if (!adaptation) {
-    return fail(
-        ErrorCode::invalid_argument,
-        fmt::format("CAT02 has no adaptation of degree {:.3g} to a light of this saturation: use --adaptation-degree 1",
-                    plan.adaptation_degree));
+    return fail(ErrorCode::invalid_argument, fmt::format("CAT02 does not support an adaptation degree of {:.3g} for a "
+                                                         "light of this saturation: use --adaptation-degree 1",
+                                                         plan.adaptation_degree));
   }
   const Matrix3 from_xyz = *xyz_to_output(options.space);
   plan.adaptation = from_xyz * *adaptation * *inverse(from_xyz);
@@ -98,11 +97,7 @@ constexpr double min_dark = 1e-5;   // of LookGrid, in the pixels' unit
 Result<void> check(const LookChoice& o, OutputSpace space) {
   const auto wrong = [](const std::string& message) { return fail(ErrorCode::invalid_argument, message); };
   if ((o.look != Look::camera || o.noise_limit) && (space == OutputSpace::camera || space == OutputSpace::xyz)) {
-    return wrong(
-        "looks other than the camera's and the limit of noise need a space with red, green and blue: srgb, p3, "
-        "rec2020, "
-        "linear-srgb or "
-        "linear-rec2020");
+    return wrong("--look and --noise-limit require an RGB space: srgb, p3, rec2020, linear-srgb or linear-rec2020");
   }
   if (o.scene_luminance_cd_m2 && !(*o.scene_luminance_cd_m2 >= min_cd_m2 && *o.scene_luminance_cd_m2 <= max_cd_m2)) {
     return wrong(fmt::format("the luminance of a scene must be between {} and {} cd/m2, found {}", min_cd_m2, max_cd_m2,
@@ -141,10 +136,9 @@ Result<double> white_level_cd_m2(const RawFrame& frame, const FrameLight& light,
   if (by_profile) info.iso = choice.profile_iso;
   const std::optional<double> saturation = saturation_luminance_cd_m2(info);
   if (!saturation) {
-    return fail(
-        ErrorCode::insufficient,
-        "the luminance of the scene is unknown: the estimate needs exposure time, f-number and ISO, one of which "
-        "is not stated; give its mean in cd/m2 (--scene-luminance), or to a stage the illuminance in lux");
+    return fail(ErrorCode::insufficient,
+                "the luminance of the scene is unknown, because exposure time, f-number or ISO is not stated; give its "
+                "mean in cd/m2 (--scene-luminance), or to a stage the illuminance in lux");
   }
   look.luminance_rule = by_profile ? "profile" : "exposure";
   const double white_cd_m2 = light.light_range * *saturation;
@@ -327,9 +321,9 @@ Result<ModelTable> tabulate_model(const LookPlan& look, const ModelBasis& basis,
   if (!table) return tl::make_unexpected(table.error());
   ModelTable out{*std::move(table), {}};
   if (!(look.white_cd_m2 >= model->valid_from_cd_m2 && look.white_cd_m2 <= model->valid_to_cd_m2)) {
-    out.warnings.push_back(
-        fmt::format("the model {} is valid for whites of {:g} to {:g} cd/m2; that of this scene has {:.3g}",
-                    model->name, model->valid_from_cd_m2, model->valid_to_cd_m2, look.white_cd_m2));
+    out.warnings.push_back(fmt::format(
+        "the model {} is valid for a white of {:g} to {:g} cd/m2, and the white of this scene has {:.3g} cd/m2",
+        model->name, model->valid_from_cd_m2, model->valid_to_cd_m2, look.white_cd_m2));
   }
   if (!out.table.within_bound) {
     out.warnings.push_back(fmt::format("the table of the model {} has an error of up to {:.2g} CIEDE2000", model->name,

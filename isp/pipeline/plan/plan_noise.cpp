@@ -91,8 +91,8 @@ std::string warning_of_strong_lines(const denoise::LineOffsets& found, const den
   if (found.gain < 0.5 || lines_stand_out(found, noise)) return {};
   if (found.line_std_e < min_strong_lines * pixel_std_e(noise, snr)) return {};
   return fmt::format(
-      "{} differ by {:.3g} e-, more than the read noise; they may be noise or a fence of the scene, and are left in; "
-      "what is the same in every frame --dark-frame removes",
+      "{} have offsets of {:.3g} e-, more than the read noise, and are not corrected, because they may be part of the "
+      "scene, such as a fence; --dark-frame removes a pattern that is the same in all frames",
       found.lines == denoise::Lines::rows ? "rows" : "columns", found.line_std_e);
 }
 

@@ -110,7 +110,7 @@ Result<WhiteBalance> with_white(Result<WhiteBalance> balance, const RawFrame& fr
   if (o.white_balance.mode == WhiteBalanceChoice::Mode::automatic) {
     if (Result<WhiteBalance> daylight = white_balance_of_temperature(frame.colour, daylight_k)) {
       daylight->reason =
-          "automatic white balance found no plausible colour of a light: daylight is used; --wb sets another";
+          "automatic white balance found no plausible colour of a light and uses daylight; --wb overrides it";
       return daylight;
     }
   }

@@ -217,7 +217,7 @@ std::string why_not_dark(const RawDn& raw, const Rect& region, const BlackPoint&
   const double level = mean_of_sites(black.pedestal_dn);
   const double noise = mean_of_sites(black.noise_std_dn);
   const double tag = raw.black_tag->pattern_dn.front();
-  if (!(noise > 0)) return "the border has one value only, so it was not read out";
+  if (!(noise > 0)) return "the border was not read out, because it has one value only";
   if (std::fabs(level - tag) > std::max(max_offset_of_noise * noise, max_offset_of_range * (raw.white_dn[1] - tag))) {
     return fmt::format("the border's level {:.1f} DN is too far from the tagged black {:.1f} DN to be masked", level,
                        tag);

@@ -153,7 +153,7 @@ TEST(StartControls, AnExposureLongerThanTheFramesAskedForIsSaid) {
   EXPECT_EQ(controls.frame_duration_us, (std::array<std::int64_t, 2>{40000, 40000}));
   ASSERT_EQ(controls.warnings.size(), 1U);
   EXPECT_EQ(controls.warnings[0],
-            "an exposure of 0.05 s does not fit a frame at 25 Hz: the camera shortens one of them");
+            "an exposure of 0.05 s is longer than a frame at 25 Hz: the camera shortens one of them");
 }
 
 TEST(StartControls, FiguresBeyondLibcamerasIntegersAreTheirEnds) {

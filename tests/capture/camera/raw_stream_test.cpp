@@ -63,7 +63,7 @@ TEST(FindCamera, AnErrorNamesWhatThereIs) {
     const auto found = find_camera(cameras, several);
     ASSERT_FALSE(found);
     EXPECT_EQ(found.error().code, ErrorCode::invalid_argument);
-    EXPECT_EQ(found.error().message, R"(2 cameras fit, and only one can be opened: there is "a1" (left), "a2")");
+    EXPECT_EQ(found.error().message, R"(2 cameras match, and only one can be opened: there is "a1" (left), "a2")");
   }
   for (const char* none : {"b", "-1", "3", "99999999999999999999"}) {
     const auto found = find_camera(cameras, none);
@@ -135,7 +135,7 @@ TEST(RawStream, PicturesAreNeverTakenForRaw) {
     const auto choice = choose_raw_stream(offered, {}, "Sensor B");
     ASSERT_FALSE(choice);
     EXPECT_EQ(choice.error().code, ErrorCode::unsupported);
-    EXPECT_TRUE(choice.error().message.starts_with("this camera offers no raw stream: "));
+    EXPECT_TRUE(choice.error().message.starts_with("this camera offers no raw stream in a known format"));
     EXPECT_EQ(choice.error().where, "Sensor B");
   }
 }

@@ -161,7 +161,7 @@ TEST(RequestCamera, ADeviceThatDoesNotStartSaysWhy) {
     const char* message;
   };
   for (const Case& one : {Case{-EBUSY, ErrorCode::unreadable, "cannot start the camera: another program uses it"},
-                          Case{-ENODEV, ErrorCode::not_found, "the camera is gone: is it unplugged?"},
+                          Case{-ENODEV, ErrorCode::not_found, "the camera is no longer available: was it unplugged?"},
                           Case{-EPIPE, ErrorCode::unreadable, "cannot start the camera: Broken pipe"}}) {
     Script script;
     script.start_result = one.result;
@@ -230,7 +230,7 @@ TEST(RequestCamera, CancelledFramesEndTheStreamOrTellThatTheCameraIsGone) {
   const auto ended = camera->next(milliseconds(0));
   ASSERT_FALSE(ended);
   EXPECT_EQ(ended.error().code, ErrorCode::unreadable);
-  EXPECT_EQ(ended.error().message, "the camera ended the stream by itself: start it anew");
+  EXPECT_EQ(ended.error().message, "the camera ended the stream: start it again");
   script.complete(1, CompletionState::cancelled);
   script.completions->set_gone();
   EXPECT_EQ(code_of(camera->next(milliseconds(0))), ErrorCode::not_found);

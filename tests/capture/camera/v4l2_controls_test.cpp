@@ -28,7 +28,7 @@ TEST(V4l2Rate, IsSetAndReadBack) {
   fake.only_interval = 5;
   const auto slow = opened(fake, {.request = {.frame_rate_hz = 30}});
   EXPECT_EQ(slow->format().frame_rate_hz, 5.0);
-  EXPECT_NE(joined(slow->warnings()).find("frame rate of 30 Hz: the driver keeps to 5 Hz"), std::string::npos);
+  EXPECT_NE(joined(slow->warnings()).find("frame rate of 30 Hz: the driver keeps 5 Hz"), std::string::npos);
 }
 
 TEST(V4l2Rate, IsUnknownWhereTheDriverDoesNotTell) {

@@ -42,7 +42,7 @@ TEST(V4l2Stream, FailuresOfADequeueAreToldApart) {
     const char* words;
   };
   for (const Case& one : {Case{EIO, ErrorCode::unreadable, "the next frame cannot be read"},
-                          Case{ENODEV, ErrorCode::not_found, "the device is gone: Fake Camera?"},
+                          Case{ENODEV, ErrorCode::not_found, "the device is no longer available: Fake Camera?"},
                           Case{EINVAL, ErrorCode::unreadable, "Invalid argument"}}) {
     FakeV4l2 fake;
     const auto camera = started(fake);

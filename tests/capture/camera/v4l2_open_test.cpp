@@ -175,7 +175,7 @@ TEST(V4l2Open, EachFailureToOpenHasItsCodeAndItsCure) {
   for (const Case& one :
        {Case{ENOENT, ErrorCode::not_found, "no such device"}, Case{ENXIO, ErrorCode::not_found, "connect the camera"},
         Case{EBUSY, ErrorCode::unreadable, "another program uses it"},
-        Case{EACCES, ErrorCode::unreadable, "member of the group"},
+        Case{EACCES, ErrorCode::unreadable, "in the group that owns it"},
         Case{EINTR, ErrorCode::unreadable, "cannot be opened"},
         Case{EMFILE, ErrorCode::unreadable, "cannot be opened"}}) {
     FakeV4l2 fake;
@@ -253,7 +253,7 @@ TEST(V4l2Open, RequestsOutsideTheirRangeAreRefusedBeforeTheDeviceIsTouched) {
     EXPECT_TRUE(fake.calls.empty());
   }
   FakeV4l2 fake;
-  EXPECT_TRUE(has(refused(fake, {.request = {.analogue_gain = 2}, .gain_code = 5}), "give one of them"));
+  EXPECT_TRUE(has(refused(fake, {.request = {.analogue_gain = 2}, .gain_code = 5}), "give only one"));
 }
 
 TEST(V4l2List, NamesTheCamerasAndTheirRawFormats) {

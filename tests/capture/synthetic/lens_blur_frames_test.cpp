@@ -155,7 +155,7 @@ TEST(LensBlurFrames, ImpossibleBlursAreRefused) {
   }
   SyntheticOptions published = with_blur(1, NoiseSourceSet::all());
   published.sampling = PhotonSampling::published;
-  refused(published, "leave lens-blur out");
+  refused(published, "lens-blur: leave it out");
   EXPECT_TRUE(test::source_of(detailed_scene(4, 4), test::plain_sensor(), with_blur(10, NoiseSourceSet::all())));
 }
 

@@ -67,7 +67,7 @@ TEST(ExposureAdvice, InBrightLightTheHighlightLimitsAndTheLowestGainIsBest) {
   EXPECT_EQ(advice->best, 0u);
   EXPECT_EQ(advice->gains[0].limit, ExposureLimit::full_well);
   for (const int gain : {1, 2, 3}) EXPECT_EQ(advice->gains[gain].limit, ExposureLimit::converter_range) << gain;
-  EXPECT_TRUE(holds(advice->reason, "the highlight fills the pixels after")) << advice->reason;
+  EXPECT_TRUE(holds(advice->reason, "the highlight reaches the full well after")) << advice->reason;
   EXPECT_TRUE(holds(advice->reason, "ISO 400 would clip the highlight after")) << advice->reason;
 }
 
