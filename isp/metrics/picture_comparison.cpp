@@ -212,15 +212,6 @@ std::optional<double> ssim(const PlaneView<const float>& first, const PlaneView<
   return std::accumulate(rows.begin(), rows.end(), 0.0) / (static_cast<double>(across) * down);
 }
 
-std::vector<Lab> lab_of_picture(const SceneLinear& xyz) {
-  std::vector<Lab> out;
-  out.reserve(xyz.plane[0].size());
-  for (int y = 0; y < xyz.height(); ++y) {
-    for (int x = 0; x < xyz.width(); ++x) out.push_back(lab_at(xyz, x, y));
-  }
-  return out;
-}
-
 double mean_delta_e_94c(std::span<const Lab> reference, std::span<const Lab> test) {
   assert(reference.size() == test.size());
   double sum = 0;

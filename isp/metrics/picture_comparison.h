@@ -23,11 +23,6 @@ inline constexpr int ssim_window_px = 11;
 std::optional<double> ssim(const PlaneView<const float>& first, const PlaneView<const float>& second,
                            Executor& executor);
 
-/// Returns CIELAB of every pixel, row by row, under D65 at Y = 1. X, Y or Z below 0 lies on the straight part of the
-/// curve.
-/// @param xyz  X, Y, Z planes
-std::vector<Lab> lab_of_picture(const SceneLinear& xyz);
-
 /// Returns the mean of delta_e_94c over the pixels that are finite in both; not a number if there are none.
 /// @param test  as many as `reference`
 double mean_delta_e_94c(std::span<const Lab> reference, std::span<const Lab> test);

@@ -35,13 +35,6 @@ std::optional<RgbPrimaries> primaries_of(OutputSpace space) {
 
 }  // namespace
 
-std::optional<OutputSpace> output_space_named(std::string_view name) {
-  for (const NamedOutputSpace& known : output_spaces) {
-    if (known.name == name) return known.space;
-  }
-  return std::nullopt;
-}
-
 std::string_view name_of(OutputSpace space) {
   const auto* known = std::find_if(output_spaces.begin(), output_spaces.end(),
                                    [&](const NamedOutputSpace& candidate) { return candidate.space == space; });

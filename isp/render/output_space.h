@@ -24,8 +24,6 @@ inline constexpr std::array<NamedOutputSpace, 7> output_spaces{{{OutputSpace::sr
                                                                 {OutputSpace::xyz, "xyz"},
                                                                 {OutputSpace::camera, "camera"}}};
 
-/// Returns the output space of that name; nullopt for an unknown name.
-std::optional<OutputSpace> output_space_named(std::string_view name);
 std::string_view name_of(OutputSpace space);
 
 /// D65 is the white of every space but `camera`.

@@ -76,14 +76,6 @@ void meet_white(ToneTable& table) {
 
 }  // namespace
 
-std::optional<ToneCurve> tone_curve_named(std::string_view name) {
-  if (name == name_of(ToneCurve::standard)) return ToneCurve::standard;
-  if (name == name_of(ToneCurve::none)) return ToneCurve::none;
-  return std::nullopt;
-}
-
-std::string_view name_of(ToneCurve curve) { return curve == ToneCurve::standard ? "standard" : "none"; }
-
 double tone_limit(ToneCurve curve, double exposure_ev) {
   return curve == ToneCurve::none ? 1 : std::clamp(std::exp2(exposure_ev), 1.0, max_tone_limit);
 }

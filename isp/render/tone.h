@@ -1,8 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
-#include <string_view>
 
 #include "isp/base/image.h"
 #include "isp/base/tone_table.h"
@@ -10,10 +8,6 @@
 namespace lowlux::isp {
 
 enum class ToneCurve : std::uint8_t { standard, none };
-
-/// Returns the curve named "standard" or "none"; nullopt for another name.
-std::optional<ToneCurve> tone_curve_named(std::string_view name);
-std::string_view name_of(ToneCurve curve);
 
 /// Describes a change of the standard curve; the default changes nothing.
 struct ToneShape {

@@ -231,10 +231,6 @@ TEST(Retarget, RefusesWhatItCannotDo) {
   for (const double bad : {2.0, 3.0, -0.1, nan}) {
     EXPECT_NE(refused(250, 2, bad).find("black must be 0 or more and below its white"), std::string::npos) << bad;
   }
-  const auto unknown = retarget_method_named("magic");
-  ASSERT_FALSE(unknown);
-  EXPECT_NE(unknown.error().message.find("constrained, shin, shin-consistent, wanat"), std::string::npos);
-  EXPECT_EQ(*retarget_method_named("icam06"), RetargetMethod::icam06);
 }
 
 }  // namespace

@@ -22,12 +22,6 @@ std::vector<double> limits() {
 
 double standard(double x, double limit) { return apply_tone(ToneCurve::standard, x, limit); }
 
-TEST(ToneCurveNames, RoundTrip) {
-  EXPECT_EQ(tone_curve_named("standard"), ToneCurve::standard);
-  EXPECT_EQ(tone_curve_named("none"), ToneCurve::none);
-  EXPECT_FALSE(tone_curve_named("filmic"));
-}
-
 TEST(ToneLimit, IsWhereTheSensorSaturatesButNotBelowWhite) {
   EXPECT_EQ(tone_limit(ToneCurve::standard, 3), 8);
   EXPECT_EQ(tone_limit(ToneCurve::standard, 0), 1);

@@ -41,7 +41,6 @@ inline constexpr std::uint32_t row_noise = 3;            // x = 0, word 0
 inline constexpr std::uint32_t column_noise = 4;         // y = 0, frame 0, word 0: a fixed pattern
 inline constexpr std::uint32_t scene = 5;                // random scene content: stars
 inline constexpr std::uint32_t burst = 6;                // motion between frames. y = 0: camera, x = frame; else movers
-inline constexpr std::uint32_t risk_probe = 8;           // perturbation of a denoiser's input, to measure its response
 inline constexpr std::uint32_t code_dither = 9;          // word 0: rounds electrons to codes without bias
 inline constexpr std::uint32_t visual_noise_rods = 10;   // word 0: isomerisations in rods, by cells of 4 pixels
 inline constexpr std::uint32_t visual_noise_cones = 11;  // word 0: isomerisations in cones, by cells of 4 pixels

@@ -149,16 +149,6 @@ std::string_view name_of(RetargetMethod method) {
   return "";
 }
 
-Result<RetargetMethod> retarget_method_named(std::string_view name) {
-  std::string all;
-  for (const auto& named : retarget_methods) {
-    if (named.name == name) return named.method;
-    all.append(all.empty() ? "" : ", ").append(named.name);
-  }
-  return fail(ErrorCode::invalid_argument,
-              "there is no retargeting method '" + std::string(name) + "', there are " + all);
-}
-
 std::string coefficients_name(const RetargetOptions& options) {
   const RetargetMethod m = options.method;
   if (m != RetargetMethod::constrained && m != RetargetMethod::shin && m != RetargetMethod::shin_consistent) return "";

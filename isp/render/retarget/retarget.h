@@ -42,8 +42,6 @@ inline constexpr std::array<NamedRetargetMethod, 7> retarget_methods{
      {RetargetMethod::none, "none"}}};
 
 std::string_view name_of(RetargetMethod method);
-/// Returns the method of that name. Error: invalid_argument; the message lists the valid names.
-Result<RetargetMethod> retarget_method_named(std::string_view name);
 
 /// Holds the request for another display.
 struct RetargetOptions {
