@@ -9,7 +9,7 @@
 namespace lowlux::gst {
 namespace {
 
-constexpr int least_px = 2, most_px = 65535;
+constexpr int min_px = 2, max_px = 65535;
 constexpr const char* bayer = "video/x-bayer";
 constexpr const char* raw = "video/x-raw";
 
@@ -92,8 +92,8 @@ GstCaps* with_pictures(GstCaps* caps, GstStructure* rgb) {
 }
 
 GstStructure* any_size(const char* name) {
-  return gst_structure_new(name, "width", GST_TYPE_INT_RANGE, least_px, most_px, "height", GST_TYPE_INT_RANGE, least_px,
-                           most_px, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, G_MAXINT, 1, nullptr);
+  return gst_structure_new(name, "width", GST_TYPE_INT_RANGE, min_px, max_px, "height", GST_TYPE_INT_RANGE, min_px,
+                           max_px, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, G_MAXINT, 1, nullptr);
 }
 
 /// Returns whether a format, or one in a list of formats, begins with the order of colours of this name.
@@ -138,7 +138,7 @@ const GstStructure* fixed_structure(const GstCaps* caps, int& width, int& height
   const GstStructure* structure = gst_caps_get_structure(caps, 0);
   const bool sized = gst_structure_get_int(structure, "width", &width) != FALSE &&
                      gst_structure_get_int(structure, "height", &height) != FALSE;
-  const auto fits = [](int side) { return side >= least_px && side <= most_px; };
+  const auto fits = [](int side) { return side >= min_px && side <= max_px; };
   return sized && fits(width) && fits(height) ? structure : nullptr;
 }
 

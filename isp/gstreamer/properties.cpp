@@ -100,8 +100,8 @@ GType look_type() {
   return type;
 }
 
-constexpr double least_white_level = 1e-3;
-constexpr double least_noise_gain = 1e-6, least_noise_read = 0, least_colour_gain = 1e-3;  // that are known
+constexpr double min_white_level = 1e-3;
+constexpr double min_noise_gain = 1e-6, min_noise_read = 0, min_colour_gain = 1e-3;  // that are known
 
 }  // namespace
 
@@ -224,7 +224,7 @@ lowlux_stage_settings Properties::settings() const {
   return out;
 }
 
-double Properties::stated_white_dn() const { return white_level_dn < least_white_level ? 0 : white_level_dn; }
+double Properties::stated_white_dn() const { return white_level_dn < min_white_level ? 0 : white_level_dn; }
 
 // Values below the minimum of the stage are not stated.
 lowlux_stage_params Properties::params() const {
@@ -241,10 +241,10 @@ lowlux_stage_params Properties::params() const {
   state(analogue_gain >= 0.1, LOWLUX_STAGE_HAS_ANALOGUE_GAIN);
   out.noise_gain = static_cast<float>(noise_gain_dn_per_e);
   out.noise_read = static_cast<float>(noise_read_dn);
-  state(noise_gain_dn_per_e >= least_noise_gain && noise_read_dn >= least_noise_read, LOWLUX_STAGE_HAS_NOISE);
+  state(noise_gain_dn_per_e >= min_noise_gain && noise_read_dn >= min_noise_read, LOWLUX_STAGE_HAS_NOISE);
   out.colour_gains[0] = static_cast<float>(red_gain);
   out.colour_gains[1] = static_cast<float>(blue_gain);
-  state(red_gain >= least_colour_gain && blue_gain >= least_colour_gain, LOWLUX_STAGE_HAS_COLOUR_GAINS);
+  state(red_gain >= min_colour_gain && blue_gain >= min_colour_gain, LOWLUX_STAGE_HAS_COLOUR_GAINS);
   out.saturation = static_cast<float>(saturation);
   state(true, LOWLUX_STAGE_HAS_SATURATION);
   out.exposure_ev = static_cast<float>(exposure_ev);
@@ -259,10 +259,10 @@ lowlux_stage_params Properties::params() const {
 }
 
 const char* Properties::without_effect() const {
-  const bool red = red_gain >= least_colour_gain, blue = blue_gain >= least_colour_gain;
+  const bool red = red_gain >= min_colour_gain, blue = blue_gain >= min_colour_gain;
   if (red && !blue) return "red-gain has no effect: it requires blue-gain";
   if (blue && !red) return "blue-gain has no effect: it requires red-gain";
-  if (noise_gain_dn_per_e >= least_noise_gain && noise_read_dn < least_noise_read) {
+  if (noise_gain_dn_per_e >= min_noise_gain && noise_read_dn < min_noise_read) {
     return "noise-gain has no effect: it requires noise-read";
   }
   return nullptr;

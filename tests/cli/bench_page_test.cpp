@@ -65,7 +65,7 @@ TEST(BenchPage, PutsTheWholePipelineFirstAndTheOthersAsMeasured) {
   EXPECT_TRUE(std::ranges::is_sorted(places));
 }
 
-TEST(BenchPage, SaysWhatEachStageTookAndWhatAllTook) {
+TEST(BenchPage, StatesTheTimeOfEachStageAndOfAll) {
   const std::string page = page_of(list_of(stage_of("tone"), stage_of("alpha")));
   EXPECT_TRUE(holds(page, R"(took [s]</th>)"));
   EXPECT_TRUE(holds(page, "1.2</td></tr>"));  // to the even one
@@ -73,7 +73,7 @@ TEST(BenchPage, SaysWhatEachStageTookAndWhatAllTook) {
   EXPECT_EQ(time_text(list_of(stage_of("tone"))), "1 stage took 1.2 s");
 }
 
-TEST(BenchPage, MarksWhatIsUndominatedAndWhatDoesNotHold) {
+TEST(BenchPage, MarksParetoOptimalRowsAndFailedFindings) {
   const std::string page = page_of(list_of(stage_of("tone")));
   EXPECT_TRUE(holds(page, R"(<tr class="marked"><td class="short">fast)"));
   EXPECT_TRUE(holds(page, R"(<tr><td class="short">slow)"));
@@ -110,7 +110,7 @@ TEST(BenchPage, LeavesOutWhatAStageDoesNotHave) {
   EXPECT_TRUE(holds(page, "none are stated"));
 }
 
-TEST(BenchPage, SaysWhatTheMachineIsAndWhatIsNotKnownOfIt) {
+TEST(BenchPage, StatesTheMachineAndWhatIsUnknown) {
   const std::string page = page_of({}, {.cpu = "Made <up>", .processors = 3, .memory_gib = 7.75, .system = "\xff"});
   for (const char* part : {"Made &lt;up&gt;", ">3<", "7.8 GiB"}) EXPECT_TRUE(holds(page, part)) << part;
   EXPECT_TRUE(holds(page_of({}), "not stated by the system"));
@@ -143,7 +143,7 @@ TEST(BenchFiles, AreOnePageAndTwoFilesForEachStageAndNoneIfOneIsInTheWay) {
   EXPECT_TRUE(holds(scratch.read("bench.html"), "tone-raw.png"));
 }
 
-TEST(BenchFiles, EveryLineOfATableSaysThreadsAndInstructionSet) {
+TEST(BenchFiles, EveryRowStatesThreadsAndInstructionSet) {
   const test::ScratchDirectory scratch;
   std::vector<MeasuredStage> measured = list_of(stage_of("tone"), stage_of("alpha"));
   measured[0].outcome.threads = 3;

@@ -112,7 +112,7 @@ TEST(Bench, AFileInTheWayStopsItBeforeTheWork) {
   }
 }
 
-TEST(Bench, WithoutPicturesItSaysWhereTheyAre) {
+TEST(Bench, WithoutImagesTheErrorNamesTheirFolder) {
   const test::ScratchDirectory scratch;
   const auto missing = bench({"--pictures-folder", scratch.file("none")});
   EXPECT_EQ(missing.exit_code, 1);

@@ -156,7 +156,7 @@ TEST(Command, EveryFormatAndDepthIsWritten) {
   EXPECT_EQ(scratch.names().size(), kinds.size());
 }
 
-TEST(Command, BatchesGoOnAfterABadFileAndSaySoAtTheEnd) {
+TEST(Command, BatchesContinueAfterABadFileAndReportItAtTheEnd) {
   const test::ScratchDirectory scratch;
   const std::string bad = scratch.file("bad.dng");
   test::write_file(bad, "no raw", 6);

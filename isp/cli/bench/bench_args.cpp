@@ -20,10 +20,10 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
                  "program to score: NAME='PROGRAM {in} {out}', or a known name such as dcraw; repeatable")
       ->type_name("NAME[=COMMAND]")
       ->allow_extra_args(false);
-  add_seed(app, "--seed", "seed of the scenes and noise of the stage methods (default: 1)", args.seed);
-  add_number_within(app, "--time-limit", "S",
-                    "time limit for each frame and program of the stage methods [s] (default: 120)", 0.1, 86400,
-                    args.time_limit_s);
+  add_seed(app, "--seed", "seed of the scenes and the noise of the stage methods (default: 1)", args.seed);
+  add_text(app, "--time-limit", "S",
+           "time limit in seconds for each frame and program of the stage methods (default: 120)",
+           store_within({0.1, 86400, "s"}, args.time_limit_s));
   CLI::Option* const shard = add_shard(
       app, "run every N-th stage, starting with the I-th; with --method every N-th light level (default 1/1: all)",
       args.shard);
@@ -51,7 +51,7 @@ Parsed<BenchArgs> parse_bench(const std::vector<std::string>& words) {
       ->type_name("N");
   app.add_flag("--json", args.json, "print JSON instead of tables");
   app.add_flag("--force", args.force, "overwrite files that exist");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   return args;
 }
 

@@ -104,7 +104,7 @@ std::vector<OutputFile> text_files(const MeasuredStage& measured, const Machine&
           {id + ".json", dumped(json_of(measured, machine)) + "\n"}};
 }
 
-Result<void> check_free(const std::string& name, const BenchArgs& args) {
+Result<void> check_output_is_free(const std::string& name, const BenchArgs& args) {
   const std::filesystem::path file = std::filesystem::path(args.output) / name;
   std::error_code ignored;
   if (args.force || !std::filesystem::exists(file, ignored)) return {};
@@ -113,17 +113,17 @@ Result<void> check_free(const std::string& name, const BenchArgs& args) {
 
 Result<void> check_texts_free(const isp::BenchStage& stage, const BenchArgs& args) {
   for (const char* end : {".csv", ".json"}) {
-    if (auto free = check_free(std::string(stage.id) + end, args); !free) return free;
+    if (auto free = check_output_is_free(std::string(stage.id) + end, args); !free) return free;
   }
   return {};
 }
 
 Result<void> check_all_free(const std::vector<MeasuredStage>& measured, const BenchArgs& args) {
-  if (auto free = check_free(page_name, args); !free) return free;
+  if (auto free = check_output_is_free(page_name, args); !free) return free;
   for (const MeasuredStage& m : measured) {
     if (auto free = check_texts_free(m.stage, args); !free) return free;
     for (const isp::BenchImage& image : m.outcome.images) {
-      if (auto free = check_free(image.id + ".png", args); !free) return free;
+      if (auto free = check_output_is_free(image.id + ".png", args); !free) return free;
     }
   }
   return {};
@@ -184,7 +184,7 @@ Result<void> check_bench_files(const std::vector<isp::BenchStage>& stages, const
   std::error_code error;
   std::filesystem::create_directories(args.output, error);
   if (error) return fail(ErrorCode::unwritable, "the folder cannot be created: " + error.message(), args.output);
-  if (auto free = check_free(page_name, args); !free) return free;
+  if (auto free = check_output_is_free(page_name, args); !free) return free;
   for (const isp::BenchStage& stage : stages) {
     if (auto free = check_texts_free(stage, args); !free) return free;
   }

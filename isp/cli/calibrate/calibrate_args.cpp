@@ -36,7 +36,7 @@ void add_settings(CLI::App& app, CalibrateArgs& args) {
 }
 
 /// Returns the error of the frames' settings; empty if there is none.
-std::string wrong_settings(const CalibrateArgs& args) {
+std::string settings_error(const CalibrateArgs& args) {
   if (args.iso && *args.iso <= 0) return "--iso must be above 0";
   if (args.exposure_s && *args.exposure_s < 0) return "--exposure-time must not be negative";
   if (args.temperature_c && (*args.temperature_c < -200 || *args.temperature_c > 200)) {
@@ -47,10 +47,11 @@ std::string wrong_settings(const CalibrateArgs& args) {
 
 /// Returns the error of the arguments in combination; empty if there is none.
 std::string wrong(const CalibrateArgs& args, const std::vector<std::string>& inputs) {
-  if (std::string what = wrong_settings(args); !what.empty()) return what;
-  if (!args.output.ends_with(".json")) return "-o: profiles are .json, not " + args.output;
-  if (!args.report.empty() && !args.report.ends_with(".html")) return "--report: reports are .html, not " + args.report;
-  return wrong_names({args.output, args.report}, inputs);
+  if (std::string what = settings_error(args); !what.empty()) return what;
+  if (!args.output.ends_with(".json")) return "-o: the name of a profile must end with .json, found " + args.output;
+  if (!args.report.empty() && !args.report.ends_with(".html"))
+    return "--report: the name of a page must end with .html, found " + args.report;
+  return file_name_error({args.output, args.report}, inputs);
 }
 
 /// Explains a missing second dark: a shell expands bias/*.dng to several arguments, the option takes the first.
@@ -93,7 +94,7 @@ Parsed<CalibrateBlackArgs> parse_calibrate_black(const std::vector<std::string>&
                  "write each pixel's pedestal and dark current to PREFIX_pedestal.pfm [DN] and "
                  "PREFIX_current.pfm [e-/s] (with the ISO in the name if there are several)")
       ->type_name("PREFIX");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   if (const auto code = expand(args.common, args.common.frames)) return *code;
   if (args.system_gain_dn_per_e && *args.system_gain_dn_per_e <= 0) return refuse(app, "--system-gain must be above 0");
   if (const std::string what = wrong(args.common, args.common.frames); !what.empty()) return refuse(app, what);
@@ -122,9 +123,8 @@ Parsed<CalibrateNoiseArgs> parse_calibrate_noise(const std::vector<std::string>&
   using Method = calib::PictureNoiseMethod;
   add_choice<Method>(
       app, "--method", {{"ponomarenko", Method::ponomarenko}, {"foi", Method::foi}},
-      [&args](Method method) { args.method = method; },
-      "for one picture: blocks, or single details (default ponomarenko)");
-  if (const auto code = parse_words(app, words)) return *code;
+      [&args](Method method) { args.method = method; }, "method of measuring noise on one image (default ponomarenko)");
+  if (const auto code = parse_arguments(app, words)) return *code;
   for (std::vector<std::string>* files : {&args.common.frames, &args.darks}) {
     if (const auto code = expand(args.common, *files)) return *code;
   }
@@ -198,7 +198,7 @@ Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>&
   app.add_flag("--force", args.common.force, "overwrite files that exist");
   app.add_flag("--json", args.common.json, "print the figures as JSON instead of text");
   app.add_flag("--quiet", args.common.quiet, "print no warnings and no progress");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   for (std::vector<std::string>* files : {&args.common.frames, &args.darks}) {
     if (const auto code = expand(args.common, *files)) return *code;
   }
@@ -207,11 +207,12 @@ Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>&
   }
   if (light.any()) args.irradiance = light.light();
   if (args.darks.size() == 1) return refuse(app, one_dark(args.darks.front()));
-  if (!args.common.output.ends_with(".html")) return refuse(app, "-o: pages are .html, not " + args.common.output);
-  if (const std::string what = wrong_settings(args.common); !what.empty()) return refuse(app, what);
+  if (!args.common.output.ends_with(".html"))
+    return refuse(app, "-o: the name of a page must end with .html, found " + args.common.output);
+  if (const std::string what = settings_error(args.common); !what.empty()) return refuse(app, what);
   std::vector<std::string> inputs = args.common.frames;
   inputs.insert(inputs.end(), args.darks.begin(), args.darks.end());
-  const std::string what = wrong_names({args.common.output, json_of_sheet(args.common.output)}, inputs);
+  const std::string what = file_name_error({args.common.output, json_of_sheet(args.common.output)}, inputs);
   if (!what.empty()) return refuse(app, what);
   return args;
 }
@@ -227,7 +228,7 @@ Parsed<CalibrateQuotedArgs> parse_calibrate_quoted(const std::vector<std::string
   app.add_option("-o,--output", args.common.output, "profile to write (JSON)")->required()->type_name("PROFILE.json");
   app.add_flag("--force", args.common.force, "overwrite files that exist");
   app.add_flag("--json", args.common.json, "print JSON instead of text");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   if (const std::string what = wrong(args.common, {}); !what.empty()) return refuse(app, what);
   return args;
 }
@@ -248,7 +249,7 @@ std::string wrong_files(const CalibrateColourArgs& args) {
     const auto fits = isp::check_writable(*format, SampleType::u8, OutputSpace::srgb);
     if (!fits) return fits.error().message;
   }
-  return wrong_names({args.output, args.report, args.overlay}, {args.chart});
+  return file_name_error({args.output, args.report, args.overlay}, {args.chart});
 }
 
 std::string wrong(const CalibrateColourArgs& args) {
@@ -292,7 +293,7 @@ Parsed<CalibrateColourArgs> parse_calibrate_colour(const std::vector<std::string
       ->type_name("FILE.png");
   app.add_flag("--force", args.force, "overwrite files that exist");
   app.add_flag("--json", args.json, "print one JSON object on stdout");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   if (const std::string what = wrong(args); !what.empty()) return refuse(app, what);
   return args;
 }

@@ -31,7 +31,7 @@ namespace {
 Result<void> check_places(const CalibrateColourArgs& args) {
   for (const std::string& file : {args.output, args.report, args.overlay}) {
     if (file.empty()) continue;
-    if (auto place = check_place(file, args.force); !place) return place;
+    if (auto place = check_output_path(file, args.force); !place) return place;
   }
   return {};
 }

@@ -201,7 +201,8 @@ struct MadeSheet {
 
 Result<MadeSheet> make_sheet(const CalibrateSheetArgs& args) {
   for (const std::string& file : {args.common.output, json_of_sheet(args.common.output)}) {
-    if (const auto place = check_place(file, args.common.force); !place) return tl::make_unexpected(place.error());
+    if (const auto place = check_output_path(file, args.common.force); !place)
+      return tl::make_unexpected(place.error());
   }
   MadeSheet out;
   const auto frames = read_sheet_frames(args, out.found);

@@ -45,9 +45,9 @@ isp::Report whole_report(const CalibrateArgs& args, const Calibration& found) {
 }  // namespace
 
 Result<void> check_outputs(const CalibrateArgs& args) {
-  if (auto place = check_place(args.output, args.force); !place) return place;
+  if (auto place = check_output_path(args.output, args.force); !place) return place;
   if (args.report.empty()) return {};
-  return check_place(args.report, args.force);
+  return check_output_path(args.report, args.force);
 }
 
 Result<CameraProfile> starting_profile(const CalibrateArgs& args) {
@@ -117,7 +117,7 @@ Result<void> write_calibration(const CalibrateArgs& args, const Calibration& fou
   if (!text) return tl::make_unexpected(with_file(text.error(), args.output));
   const auto overwrite = args.force ? isp::Overwrite::yes : isp::Overwrite::no;
   for (const PixelMap& map : found.maps) {
-    if (auto free = check_place(map.path, args.force); !free) return free;
+    if (auto free = check_output_path(map.path, args.force); !free) return free;
   }
   auto files = prepare_maps(found.maps, overwrite);
   if (!files) return tl::make_unexpected(files.error());

@@ -20,7 +20,7 @@ constexpr double usual_frame_rate_hz = 30;
 constexpr double usual_clipped_fraction = 1e-3;
 constexpr double first_exposure_s = 0.01;
 constexpr int latency_of_controls = 4;  // frames from a setting to its effect, at most
-constexpr double most_black = 0.25;     // of white: no camera has a higher pedestal
+constexpr double max_black = 0.25;      // of white: no camera has a higher pedestal
 
 Result<isp::ExposureLimits> limits_of(const CaptureArgs& args, const capture::CameraFormat& format,
                                       const capture::ExposureControls& controls) {
@@ -113,7 +113,7 @@ isp::MeteredBlack AutoExposure::black_of(const capture::FrameFacts& facts) {
     return out;
   }
   const PerSite<double> darkest = meter_.darkest_dn();
-  if (!darkest_dn_) darkest_dn_.emplace().fill(most_black * largest_code(format));
+  if (!darkest_dn_) darkest_dn_.emplace().fill(max_black * largest_code(format));
   for (int site = 0; site < 4; ++site) (*darkest_dn_)[site] = std::min((*darkest_dn_)[site], darkest[site]);
   return {*darkest_dn_, true};
 }

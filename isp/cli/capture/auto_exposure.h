@@ -37,7 +37,7 @@ class AutoExposure {
   Result<void> take(capture::CameraFrame& frame);
 
   /// Whether an exposure was found, or was looked for long enough (500 frames).
-  bool is_ready() const { return found_ || frames_ >= most_frames; }
+  bool is_ready() const { return found_ || frames_ >= max_frames; }
   bool found() const { return found_; }
   ExposureState state() const;
 
@@ -57,7 +57,7 @@ class AutoExposure {
   isp::ExposureController controller_;
   isp::ExposureMeter meter_;
   std::vector<std::uint16_t> row_;
-  static constexpr int most_frames = 500;
+  static constexpr int max_frames = 500;
   int frames_ = 0;
   bool found_ = false;
 };

@@ -22,8 +22,6 @@ namespace lowlux::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using Wrong = std::optional<std::string>;
-
 constexpr double longest_timeout_s = 86400;
 constexpr double max_frames = 1e9;
 constexpr double min_budget_ms = 0.01, max_budget_ms = 1e6;  // limits of the stage
@@ -36,7 +34,7 @@ struct Words {
   std::optional<double> frames;
 };
 
-Wrong set_format(const std::string& text, capture::CameraRequest& request) {
+ArgumentError set_format(const std::string& text, capture::CameraRequest& request) {
   const auto formats = raw_formats();
   const auto found = std::ranges::find_if(formats, [&](const RawFormatNames& names) {
     return text == names.libcamera || (names.v4l2_fourcc != 0 && text == v4l2_text(names.v4l2_fourcc));
@@ -49,7 +47,7 @@ Wrong set_format(const std::string& text, capture::CameraRequest& request) {
   return std::nullopt;
 }
 
-Wrong set_size(const std::string& text, capture::CameraRequest& request) {
+ArgumentError set_size(const std::string& text, capture::CameraRequest& request) {
   const auto cross = text.find('x');
   const auto whole = [](const std::string& digits) -> std::optional<int> {
     const auto number = number_of(digits);
@@ -64,8 +62,9 @@ Wrong set_size(const std::string& text, capture::CameraRequest& request) {
   return std::nullopt;
 }
 
-std::function<Wrong(const std::string&)> store_positive(std::optional<double>& out, double most, const char* unit) {
-  return [&out, most, unit](const std::string& text) -> Wrong {
+std::function<ArgumentError(const std::string&)> store_positive(std::optional<double>& out, double most,
+                                                                const char* unit) {
+  return [&out, most, unit](const std::string& text) -> ArgumentError {
     const auto number = quantity_of(text, unit);
     if (!number || !(*number > 0 && *number <= most))
       return fmt::format("is not above 0 and at most {:g} {}", most, unit);
@@ -96,7 +95,7 @@ void add_source(CLI::App& app, CaptureArgs& args) {
       ->type_name("CODE");
   add_text(app, "--flip", "h|v|hv",
            "flip the readout of the sensor horizontally, vertically or both (default: the camera's setting)",
-           [&request](const std::string& text) -> Wrong {
+           [&request](const std::string& text) -> ArgumentError {
              if (text != "h" && text != "v" && text != "hv") return "is none of h, v, hv";
              request.flip_horizontal = text.starts_with('h');
              request.flip_vertical = text.ends_with('v');
@@ -112,7 +111,7 @@ void add_source(CLI::App& app, CaptureArgs& args) {
 
 void add_frames(CLI::App& app, CaptureArgs& args, Words& words) {
   const auto store_whole = [](auto store) {
-    return [store](const std::string& text) -> Wrong {
+    return [store](const std::string& text) -> ArgumentError {
       const auto number = number_of(text);
       if (!number || !(*number >= 0 && *number <= max_frames) ||
           *number != static_cast<double>(static_cast<std::uint64_t>(*number))) {
@@ -128,7 +127,7 @@ void add_frames(CLI::App& app, CaptureArgs& args, Words& words) {
   add_text(app, "--skip", "N", "number of frames to discard first, while the exposure settles (default 0)",
            store_whole([&args](double number) { args.limits.skip = static_cast<std::uint64_t>(number); }));
   add_text(app, "--timeout", "S", "longest time to wait for a frame (default 5)",
-           [&args](const std::string& text) -> Wrong {
+           [&args](const std::string& text) -> ArgumentError {
              const auto number = quantity_of(text, "s");
              if (!number || !(*number >= 0.001 && *number <= longest_timeout_s)) {
                return fmt::format("is not within 0.001 to {:g} s", longest_timeout_s);
@@ -148,10 +147,8 @@ void add_output(CLI::App& app, CaptureArgs& args, Words& words) {
   app.add_flag("--raw", words.raw, "write raw files, like --as dng");
   app.add_flag("--live", words.live, "write video to standard output: YUV4MPEG2, which ffplay and ffmpeg read");
   app.add_flag("--temporal", args.temporal, "with --live: use previous frames for noise reduction");
-  add_text(app, "--budget-ms", "MS",
-           "with --live: time limit for each frame; noise reduction that does not fit is reduced in steps: standard in "
-           "place of high, draft, no level, plain. No frame is dropped",
-           [&args](const std::string& text) -> Wrong {
+  add_text(app, "--budget-ms", "MS", "with --live: time limit for each frame; noise reduction is lowered until it fits",
+           [&args](const std::string& text) -> ArgumentError {
              args.budget_ms = quantity_of(text, "ms");
              if (args.budget_ms && *args.budget_ms >= min_budget_ms && *args.budget_ms <= max_budget_ms) {
                return std::nullopt;
@@ -178,7 +175,7 @@ std::optional<std::string> given_of(const CLI::App& app, std::span<const char* c
   return found == options.end() ? std::nullopt : std::optional<std::string>(*found);
 }
 
-Wrong wrong_for_raw(const CLI::App& app, const CaptureArgs& args) {
+ArgumentError raw_output_error(const CLI::App& app, const CaptureArgs& args) {
   auto given = given_of(app, of_pictures);
   if (!given) given = given_of(app, of_pictures_and_films);
   if (given) return *given + " does not apply to raw files: use it with `develop`";
@@ -190,7 +187,7 @@ Wrong wrong_for_raw(const CLI::App& app, const CaptureArgs& args) {
   return std::nullopt;
 }
 
-Wrong wrong_for_live(const CLI::App& app, const CaptureArgs& args) {
+ArgumentError live_output_error(const CLI::App& app, const CaptureArgs& args) {
   if (const auto given = given_of(app, of_pictures)) return *given + " applies to image files, not to --live";
   const isp::DevelopOptions& options = args.develop.options;
   using WhiteMode = isp::WhiteBalanceChoice::Mode;
@@ -210,7 +207,7 @@ Wrong wrong_for_live(const CLI::App& app, const CaptureArgs& args) {
   return std::nullopt;
 }
 
-Wrong wrong_camera(const CaptureArgs& args) {
+ArgumentError camera_error(const CaptureArgs& args) {
   if (args.v4l2.empty() == args.libcamera.empty()) {
     return "name one camera: --v4l2 /dev/videoN or --libcamera ID; --list prints the connected cameras";
   }
@@ -221,7 +218,7 @@ Wrong wrong_camera(const CaptureArgs& args) {
 }
 
 /// Sets the destination and kind of the frames.
-Wrong set_kind(const Words& words, CaptureArgs& args) {
+ArgumentError set_kind(const Words& words, CaptureArgs& args) {
   const std::string& output = args.develop.output;
   if (words.live) {
     if (!output.empty() || words.raw || !words.as.empty())
@@ -252,13 +249,13 @@ Wrong set_kind(const Words& words, CaptureArgs& args) {
   return std::nullopt;
 }
 
-Wrong complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
+ArgumentError complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
   if (args.list) return std::nullopt;
-  if (auto wrong = wrong_camera(args)) return wrong;
-  if (auto wrong = wrong_auto_exposure(app, args.auto_exposure)) return wrong;
+  if (auto wrong = camera_error(args)) return wrong;
+  if (auto wrong = auto_exposure_error(app, args.auto_exposure)) return wrong;
   if (auto wrong = set_kind(words, args)) return wrong;
   DevelopArgs& develop = args.develop;
-  if (auto wrong = wrong_profiles(develop)) return wrong;
+  if (auto wrong = profile_option_error(develop)) return wrong;
   const bool as_develop = args.kind == CaptureKind::pictures;
   const Planner planner = as_develop ? Planner::of_everything : Planner::of_look;
   if (auto wrong = complete_look(develop.look, planner, develop.options.look)) return wrong;
@@ -267,8 +264,8 @@ Wrong complete(const CLI::App& app, const Words& words, CaptureArgs& args) {
   }
   const bool endless = args.folder || args.kind == CaptureKind::live;
   args.limits.frames = static_cast<std::uint64_t>(words.frames.value_or(endless ? 0 : 1));
-  if (args.kind == CaptureKind::raw) return wrong_for_raw(app, args);
-  return args.kind == CaptureKind::live ? wrong_for_live(app, args) : std::nullopt;
+  if (args.kind == CaptureKind::raw) return raw_output_error(app, args);
+  return args.kind == CaptureKind::live ? live_output_error(app, args) : std::nullopt;
 }
 
 }  // namespace
@@ -287,7 +284,7 @@ Parsed<CaptureArgs> parse_capture(const std::vector<std::string>& words) {
   add_look(app, args.develop.look);
   add_camera(app, args.develop);
   add_denoise(app, args.develop);
-  if (const auto code = parse_words(app, words, &args.develop.defaults)) return *code;
+  if (const auto code = parse_arguments(app, words, &args.develop.defaults)) return *code;
   if (const auto wrong = complete(app, said, args)) return refuse(app, *wrong);
   return args;
 }

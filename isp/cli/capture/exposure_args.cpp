@@ -12,14 +12,12 @@
 namespace lowlux::cli {
 namespace {
 
-using Wrong = std::optional<std::string>;
-
-constexpr double least_exposure_s = 1e-7, most_exposure_s = 1e5, most_gain = 1e4;
+constexpr double min_exposure_s = 1e-7, max_exposure_s = 1e5, most_gain = 1e4;
 
 /// Reads "16=1,32=2,64=4".
-Wrong set_gain_codes(const std::string& text, std::vector<capture::CameraGain>& out) {
+ArgumentError set_gain_codes(const std::string& text, std::vector<capture::CameraGain>& out) {
   out.clear();
-  for (const std::string& word : words_of(text)) {
+  for (const std::string& word : split_at_commas(text)) {
     const auto equals = word.find('=');
     const auto code = number_of(word.substr(0, equals));
     const auto factor = equals == std::string::npos ? std::nullopt : quantity_of(word.substr(equals + 1), "x");
@@ -39,38 +37,27 @@ Wrong set_gain_codes(const std::string& text, std::vector<capture::CameraGain>& 
   return std::nullopt;
 }
 
-OptionStore store_within(std::optional<double>& out, double low, double high, const char* unit) {
-  return [&out, low, high, unit](const std::string& text) -> Wrong {
-    const auto number = quantity_of(text, unit);
-    if (!number || !(*number >= low && *number <= high))
-      return fmt::format("is not within {:g} to {:g}{}{}", low, high, *unit == 0 ? "" : " ", unit);
-    out = number;
-    return std::nullopt;
-  };
-}
-
 }  // namespace
 
 void add_auto_exposure(CLI::App& app, AutoExposureArgs& args) {
   app.add_flag("--auto-exposure", args.wanted, "set exposure time and gain for the best signal-to-noise ratio");
-  add_text(app, "--max-exposure", "S", "with --auto-exposure: longest exposure (default: that of the frame rate)",
-           store_within(args.longest_s, least_exposure_s, most_exposure_s, "s"));
+  add_text(app, "--max-exposure", "S", "with --auto-exposure: longest exposure time (default: one frame period)",
+           store_within({min_exposure_s, max_exposure_s, "s"}, args.longest_s));
   add_text(app, "--max-gain", "X", "with --auto-exposure: largest analogue gain (default: the camera's)",
-           store_within(args.max_gain, 1e-3, most_gain, "x"));
+           store_within({1e-3, most_gain, "x"}, args.max_gain));
   add_choice<isp::Mains>(
       app, "--mains",
       {{"auto", isp::Mains::either}, {"50", isp::Mains::hz50}, {"60", isp::Mains::hz60}, {"off", isp::Mains::off}},
       [&args](isp::Mains mains) { args.mains = mains; },
       "with --auto-exposure: mains frequency of flickering lamps (default: auto, 50 and 60 Hz)");
   add_text(app, "--clip", "FRACTION",
-           "with --auto-exposure: upper limit of the fraction of clipped pixels in the fullest channel, noise included "
-           "(default 0.001)",
-           store_within(args.clipped_fraction, 1e-9, 0.5, ""));
-  add_text(app, "--gain-codes", "CODE=X,...", "with --auto-exposure: gain codes of a V4L2 camera, and their factors",
+           "with --auto-exposure: largest fraction of clipped pixels in the brightest channel (default 0.001)",
+           store_within({1e-9, 0.5}, args.clipped_fraction));
+  add_text(app, "--gain-codes", "CODE=X,...", "with --auto-exposure: gain codes of a V4L2 camera and their factors",
            [&args](const std::string& text) { return set_gain_codes(text, args.gain_codes); });
 }
 
-std::optional<std::string> wrong_auto_exposure(const CLI::App& app, const AutoExposureArgs& args) {
+std::optional<std::string> auto_exposure_error(const CLI::App& app, const AutoExposureArgs& args) {
   constexpr std::array of_automatic{"--max-exposure", "--max-gain", "--mains", "--clip", "--gain-codes"};
   if (!args.wanted) {
     const auto* const given =

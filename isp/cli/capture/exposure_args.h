@@ -27,6 +27,6 @@ struct AutoExposureArgs {
 void add_auto_exposure(CLI::App& app, AutoExposureArgs& args);
 
 /// Returns the error of the options in combination; nothing if there is none.
-std::optional<std::string> wrong_auto_exposure(const CLI::App& app, const AutoExposureArgs& args);
+std::optional<std::string> auto_exposure_error(const CLI::App& app, const AutoExposureArgs& args);
 
 }  // namespace lowlux::cli

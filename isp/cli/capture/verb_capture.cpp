@@ -80,7 +80,8 @@ Result<void> check_files(const CaptureArgs& args) {
     if (error) return fail(ErrorCode::unwritable, "the folder cannot be created: " + error.message(), develop.output);
   }
   const std::string first = frame_file(args, 1);
-  if (auto place = check_place(first, develop.force); !place || args.limits.frames == 1 || develop.force) return place;
+  if (auto place = check_output_path(first, develop.force); !place || args.limits.frames == 1 || develop.force)
+    return place;
   const std::string name = fs::path(first).filename().string();
   const std::size_t at = name.rfind("0001");
   const fs::path folder = fs::path(first).parent_path();

@@ -17,7 +17,7 @@ Parsed<CompareArgs> parse_compare(const std::vector<std::string>& words) {
   app.add_option("A", args.reference, "reference image (PNG, JPEG, TIFF, OpenEXR, PFM, PPM)")->required();
   app.add_option("B", args.test, "image of the same size")->required();
   app.add_flag("--json", args.json, "print JSON instead of text");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   return args;
 }
 

@@ -18,7 +18,7 @@ Parsed<DatasetArgs> parse_dataset(const std::vector<std::string>& words) {
   app.add_flag("--force", args.force, "replace samples of another spec or version in DIR");
   app.add_flag("--json", args.json, "print one JSON object on stdout");
   app.add_flag("--quiet", args.quiet, "print no warnings and no progress");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   if (args.output.empty() && !args.dry_run) return refuse(app, "-o is required: the folder of the samples");
   return args;
 }

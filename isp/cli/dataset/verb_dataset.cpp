@@ -162,8 +162,8 @@ void warn_of_space(double bytes, const std::string& folder) {
   std::error_code failed;
   const fs::space_info space = fs::space(folder, failed);
   if (failed || static_cast<double>(space.available) >= bytes) return;
-  print_err(one_line(fmt::format("lowlux: {}: warning: {} are free, and {} are predicted", folder,
-                                 size_text(static_cast<double>(space.available)), size_text(bytes))) +
+  print_err(one_line(fmt::format("lowlux: {}: warning: the data set is predicted to need {}, and {} are free", folder,
+                                 size_text(bytes), size_text(static_cast<double>(space.available)))) +
             "\n");
 }
 

@@ -224,7 +224,7 @@ Result<std::shared_ptr<const DarkFrame>> DarkSource::frame_for(RawFrame& picture
     request.pedestal_dn = tag->pedestal_dn;
     if (picture.noise) request.noise = noise_model_of(raw, *picture.noise, tag->pedestal_dn);
   }
-  auto dark = make_or_find(raw, request);
+  auto dark = find_or_make(raw, request);
   if (!dark) return dark;
   if (request.is_bias) {
     const auto level = isp::choose_black_by_gain(picture, black);
@@ -290,7 +290,7 @@ void DarkSource::count_exposures(const RawDn& picture, calib::DarkRequest& reque
   }
 }
 
-Result<std::shared_ptr<const DarkFrame>> DarkSource::make_or_find(const RawDn& picture, calib::DarkRequest& request) {
+Result<std::shared_ptr<const DarkFrame>> DarkSource::find_or_make(const RawDn& picture, calib::DarkRequest& request) {
   const auto setting = calib::setting_of(picture);
   if (!setting) return tl::make_unexpected(setting.error());
   const std::lock_guard lock(mutex_);  // others that need the same frame wait for it

@@ -80,7 +80,7 @@ class DarkSource {
   };
   static constexpr std::size_t max_made = 4;  // exposures of a bracket, and one more
 
-  Result<std::shared_ptr<const DarkFrame>> make_or_find(const RawDn& picture, calib::DarkRequest& request);
+  Result<std::shared_ptr<const DarkFrame>> find_or_make(const RawDn& picture, calib::DarkRequest& request);
   Result<void> adopt_masters(const RawDn& picture, const calib::FrameSetting& setting,
                              const calib::DarkRequest& request);
   /// Returns whether there are bias frames alone.

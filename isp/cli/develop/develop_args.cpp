@@ -57,7 +57,7 @@ void add_output(CLI::App& app, DevelopArgs& args) {
 
 Parsed<DevelopArgs> parse(CLI::App& app, const std::vector<std::string>& words, DevelopArgs& args,
                           const std::set<std::string>& left_out = {}) {
-  if (const auto code = parse_words(app, words, &args.defaults, left_out)) return *code;
+  if (const auto code = parse_arguments(app, words, &args.defaults, left_out)) return *code;
   return args;
 }
 
@@ -69,7 +69,7 @@ Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& w
     return refuse(app, "--maps and --denoise off are mutually exclusive: the maps describe the denoised image");
   }
   if (std::holds_alternative<DevelopArgs>(parsed)) {
-    if (const auto wrong = wrong_profiles(args)) return refuse(app, *wrong);
+    if (const auto wrong = profile_option_error(args)) return refuse(app, *wrong);
   }
   return parsed;
 }
@@ -117,7 +117,7 @@ std::set<std::string> excluded_by(const std::vector<std::string>& words, const D
     CLI::App app(develop_summary, develop_name);
     DevelopArgs args;
     add_develop(app, args);
-    return !parse_words(app, words, &args.defaults, left_out) && contradicts(args);
+    return !parse_arguments(app, words, &args.defaults, left_out) && contradicts(args);
   });
 }
 
@@ -198,7 +198,7 @@ Parsed<DevelopArgs> parse_merge(const std::vector<std::string>& words) {
   app.add_flag("--quiet", args.quiet, "print no warnings and no progress");
   Parsed<DevelopArgs> parsed = parse(app, words, args);
   if (auto* const good = std::get_if<DevelopArgs>(&parsed)) {
-    if (const auto wrong = wrong_profiles(*good)) return refuse(app, *wrong);
+    if (const auto wrong = profile_option_error(*good)) return refuse(app, *wrong);
     if (const auto wrong = settle_merging(good->merging, good->effects.budgeted())) return refuse(app, *wrong);
     if (good->effects.budgeted()) good->effects.effects.emplace();  // the budget of each frame is part of it
   }
@@ -211,7 +211,7 @@ Parsed<InfoArgs> parse_info(const std::vector<std::string>& words) {
   app.add_option("RAW", args.inputs, "raw files, or folders of them; with --advise one raw file or none");
   app.add_flag("--json", args.json, "print JSON instead of text");
   add_advise(app, args.advise);
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   const std::string wrong = validate_advise(app, args.advise, args.inputs.size());
   if (!wrong.empty()) return refuse(app, wrong);
   return args;
@@ -233,7 +233,7 @@ Parsed<ReproduceArgs> parse_reproduce(const std::vector<std::string>& words) {
   add_seed(app, "--seed", "seed of the random numbers (default 1)", args.seed);
   app.add_flag("--json", args.json, "print JSON instead of a table");
   app.add_flag("--force", args.force, "overwrite files that exist");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   return args;
 }
 
@@ -341,7 +341,7 @@ void add_camera(CLI::App& app, DevelopArgs& args) {
       "auto)");
 }
 
-std::optional<std::string> wrong_profiles(const DevelopArgs& args) {
+std::optional<std::string> profile_option_error(const DevelopArgs& args) {
   if (!args.profile.empty() && !args.black_profile.empty()) {
     return "--black and --profile both name a profile: use only --profile, which includes the black level";
   }

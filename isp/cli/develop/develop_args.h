@@ -115,7 +115,7 @@ void add_rendering(CLI::App& app, DevelopArgs& args);
 /// Adds the options of the camera's known properties and of corrections that use them.
 void add_camera(CLI::App& app, DevelopArgs& args);
 /// Returns the error of the options of add_camera in combination, or nothing.
-std::optional<std::string> wrong_profiles(const DevelopArgs& args);
+std::optional<std::string> profile_option_error(const DevelopArgs& args);
 /// Lists the levels of noise reduction that a command offers.
 enum class NoiseLevels : std::uint8_t { off_too, at_least_draft };
 /// Adds the options of noise reduction.

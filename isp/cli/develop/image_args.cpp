@@ -31,7 +31,7 @@ Names<Choice> named_choices() {
 }
 
 std::optional<Choice> temperature_of(const std::string& text) {
-  const std::vector<std::string> words = words_of(text);
+  const std::vector<std::string> words = split_at_commas(text);
   if (words.empty() || words.size() > 2) return std::nullopt;
   const auto kelvin = quantity_of(words[0], "K");
   const auto tint = words.size() == 2 ? number_of(words[1]) : 0.0;
@@ -68,7 +68,7 @@ constexpr double max_saturation = 3;
 
 /// Returns a crop of four whole numbers of pixels, or of four percentages, each with its sign.
 std::optional<isp::PictureCrop> crop_of(const std::string& text) {
-  const std::vector<std::string> words = words_of(text);
+  const std::vector<std::string> words = split_at_commas(text);
   if (words.size() != 4) return std::nullopt;
   const bool percent = words.front().ends_with('%');
   double figures[4]{};
@@ -83,17 +83,6 @@ std::optional<isp::PictureCrop> crop_of(const std::string& text) {
   }
   if (!(figures[2] > 0 && figures[3] > 0)) return std::nullopt;
   return isp::PictureCrop{figures[0], figures[1], figures[2], figures[3], percent};
-}
-
-/// Returns a store for a number within a range, the unit in any case or left out.
-OptionStore store_in_range(double least, double most, const char* unit, double& out) {
-  return [=, &out](const std::string& text) -> std::optional<std::string> {
-    const auto figure = *unit == '\0' ? number_of(text) : quantity_of(text, unit);
-    if (!figure || !(*figure >= least && *figure <= most))
-      return fmt::format("is not a number from {} to {}", least, most);
-    out = *figure;
-    return std::nullopt;
-  };
 }
 
 }  // namespace
@@ -127,13 +116,13 @@ void add_white_balance(CLI::App& app, Choice& choice) {
 }
 
 void add_adjustments(CLI::App& app, isp::DevelopOptions& options) {
-  add_text(app, "--brightness", "EV", "show mid-tones 2^EV times as bright, black and white stay: -1 to 2 (default: 0)",
-           store_in_range(isp::min_brightness_ev, isp::max_brightness_ev, "EV", options.tone_shape.brightness_ev));
-  add_text(app, "--contrast", "FACTOR", "factor of the tone curve's slope at middle grey: 0.5 to 1.5 (default: 1)",
-           store_in_range(isp::min_contrast, isp::max_contrast, "", options.tone_shape.contrast));
+  add_text(app, "--brightness", "EV", "brightness of mid-tones, -1 to 2; black and white do not change (default: 0)",
+           store_within({isp::min_brightness_ev, isp::max_brightness_ev, "EV"}, options.tone_shape.brightness_ev));
+  add_text(app, "--contrast", "FACTOR", "factor on the slope of the tone curve at middle grey, 0.5 to 1.5 (default: 1)",
+           store_within({isp::min_contrast, isp::max_contrast}, options.tone_shape.contrast));
   add_text(app, "--saturation", "FACTOR",
-           "factor of the distance to the grey of the same luminance, in linear light: 0 to 3 (default: 1)",
-           store_in_range(0, max_saturation, "", options.saturation));
+           "factor on the saturation in linear light, 0 to 3; luminance does not change (default: 1)",
+           store_within({0, max_saturation}, options.saturation));
 }
 
 void add_finish(CLI::App& app, isp::DevelopOptions& options) {
@@ -142,24 +131,24 @@ void add_finish(CLI::App& app, isp::DevelopOptions& options) {
       [&options](isp::Highlights highlights) { options.highlights = highlights; },
       "saturated areas: make them white, or reconstruct their colour from unsaturated channels and the surroundings "
       "(default: clip)");
-  add_text(app, "--local-tone", "SHARE",
-           "make shadows brighter and highlights darker, 0 to 1, and preserve detail and the order of areas; noise "
-           "limits the brightening of shadows (default: 0)",
-           store_in_range(0, 1, "", options.local_tone));
-  add_text(app, "--sharpen", "off|BLUR",
-           "sharpen for a blur of this standard deviation in pixels, 0.3 to 1.5, as far as detail exceeds the noise "
-           "(default: off)",
-           [&options](const std::string& text) -> std::optional<std::string> {
-             options.sharpen_px.reset();
-             if (text == "off") return std::nullopt;
-             const auto blur = quantity_of(text, "px");
-             if (!blur || !(*blur >= isp::min_sharpening_px && *blur <= isp::max_sharpening_px)) {
-               return fmt::format("is neither off nor a blur from {} to {} pixels", isp::min_sharpening_px,
-                                  isp::max_sharpening_px);
-             }
-             options.sharpen_px = *blur;
-             return std::nullopt;
-           });
+  add_text(
+      app, "--local-tone", "FRACTION",
+      "brighten shadows and darken highlights, 0 to 1, and preserve detail; noise limits the brightening (default: 0)",
+      store_within({0, 1}, options.local_tone));
+  add_text(
+      app, "--sharpen", "off|BLUR",
+      "invert a blur of this standard deviation in pixels, 0.3 to 1.5, where detail exceeds the noise (default: off)",
+      [&options](const std::string& text) -> std::optional<std::string> {
+        options.sharpen_px.reset();
+        if (text == "off") return std::nullopt;
+        const auto blur = quantity_of(text, "px");
+        if (!blur || !(*blur >= isp::min_sharpening_px && *blur <= isp::max_sharpening_px)) {
+          return fmt::format("is neither off nor a blur from {} to {} pixels", isp::min_sharpening_px,
+                             isp::max_sharpening_px);
+        }
+        options.sharpen_px = *blur;
+        return std::nullopt;
+      });
 }
 
 void add_framing(CLI::App& app, isp::DevelopOptions& options) {

@@ -16,26 +16,7 @@ namespace {
 
 constexpr double eye_noise_limit = 2;  // CIE L*
 
-using Wrong = std::optional<std::string>;
-
-/// Holds a number with its range for the message.
-struct Range {
-  double least;
-  double most;
-  const char* is_not;
-  const char* unit = "";
-};
-
-Wrong store_number(const std::string& text, const Range& range, double& out) {
-  const std::optional<double> number = quantity_of(text, range.unit);
-  if (!number || !(*number >= range.least && *number <= range.most)) {
-    return fmt::format("{} from {} to {}", range.is_not, range.least, range.most);
-  }
-  out = *number;
-  return std::nullopt;
-}
-
-Wrong set_effects(const std::string& text, isp::LookChoice& choice) {
+ArgumentError set_effects(const std::string& text, isp::LookChoice& choice) {
   using Which = isp::LookChoice::Which;
   if (text == "auto" || text == "all") {
     choice.which = text == "all" ? Which::all : Which::automatic;
@@ -44,7 +25,7 @@ Wrong set_effects(const std::string& text, isp::LookChoice& choice) {
   choice.which = Which::listed;
   choice.listed = {false, false, false, false, false, false};
   if (text == "none") return std::nullopt;
-  for (const std::string& word : words_of(text)) {
+  for (const std::string& word : split_at_commas(text)) {
     bool* const effect = isp::effect_named(choice.listed, word);
     if (effect == nullptr) {
       return fmt::format("names '{}', which is none of {}", word, fmt::join(isp::night_effect_names, ", "));
@@ -55,34 +36,30 @@ Wrong set_effects(const std::string& text, isp::LookChoice& choice) {
 }
 
 void add_scene(CLI::App& app, LookArgs& args) {
-  add_text(app, "--scene-luminance", "auto|CD_M2",
-           "mean luminance of the scene, for --look eye and models: from f-number, exposure time and ISO, of the file "
-           "or its "
-           "camera's profile (auto, default), or given",
-           [&args](const std::string& text) -> Wrong {
-             args.given.emplace_back("--scene-luminance");
-             args.choice.scene_luminance_cd_m2.reset();
-             if (text == "auto") return std::nullopt;
-             double luminance = 0;
-             if (auto wrong =
-                     store_number(text, {1e-7, 1e9, "is neither auto nor a luminance in cd/m2", "cd/m2"}, luminance)) {
-               return wrong;
-             }
-             args.choice.scene_luminance_cd_m2 = luminance;
-             return std::nullopt;
-           });
   add_text(
-      app, "--field-of-view", "DEGREES",
-      "angle that the longer side of the image covers in the scene; determines the detail that the eye resolves "
-      "(default 50)",
-      [&args](const std::string& text) {
-        args.given.emplace_back("--field-of-view");
-        return store_number(text, {0.1, 180, "is not an angle in degrees", "degrees"}, args.choice.field_of_view_deg);
+      app, "--scene-luminance", "auto|CD_M2",
+      "mean luminance of the scene, for --look eye and models (default: auto, from f-number, exposure time and ISO)",
+      [&args](const std::string& text) -> ArgumentError {
+        args.given.emplace_back("--scene-luminance");
+        args.choice.scene_luminance_cd_m2.reset();
+        if (text == "auto") return std::nullopt;
+        double luminance = 0;
+        if (auto wrong = store_number(text, {1e-7, 1e9, "cd/m2", "is neither auto nor a luminance"}, luminance)) {
+          return wrong;
+        }
+        args.choice.scene_luminance_cd_m2 = luminance;
+        return std::nullopt;
       });
+  add_text(app, "--field-of-view", "DEGREES",
+           "field of view of the longer side, which determines the detail that the eye resolves (default 50)",
+           [&args](const std::string& text) {
+             args.given.emplace_back("--field-of-view");
+             return store_number(text, {0.1, 180, "degrees", "is not an angle"}, args.choice.field_of_view_deg);
+           });
 }
 
 /// Stores a lamp or an S/P; the file of a spectrum is read later.
-Wrong set_light(const std::string& text, LookArgs& args) {
+ArgumentError set_light(const std::string& text, LookArgs& args) {
   args.choice.light.reset();
   args.light_file.clear();
   if (text.ends_with(".csv")) {
@@ -104,44 +81,41 @@ void add_light(CLI::App& app, LookArgs& args) {
              return set_light(text, args);
            });
   add_text(app, "--adaptation-degree", "auto|DEGREE",
-           "adaptation to the colour of the light, 0 to 1 (auto: CIE 159 with --light, else 1)",
-           [&args](const std::string& text) -> Wrong {
+           "degree of adaptation to the colour of the light, 0 to 1 (auto: CIE 159 with --light, else 1)",
+           [&args](const std::string& text) -> ArgumentError {
              args.given.emplace_back("--adaptation-degree");
              args.choice.adaptation_degree.reset();
              if (text == "auto") return std::nullopt;
              double degree = 0;
-             if (auto wrong = store_number(text, {0, 1, "is neither auto nor a degree"}, degree)) return wrong;
+             if (auto wrong = store_number(text, {0, 1, "", "is neither auto nor a degree"}, degree)) return wrong;
              args.choice.adaptation_degree = degree;
              return std::nullopt;
            });
 }
 
 void add_effects(CLI::App& app, LookArgs& args) {
-  add_text(
-      app, "--effects", "auto|all|none|LIST",
-      fmt::format("corrections and night-vision effects to apply: auto (only those visible in this image, never glare "
-                  "and visual-noise), all, none, or a comma-separated list of the effects ({}) (default: auto)",
-                  fmt::join(isp::night_effect_names, ", ")),
-      [&args](const std::string& text) {
-        args.given.emplace_back("--effects");
-        return set_effects(text, args.choice);
-      });
-  add_text(
-      app, "--tolerance", "DELTA_E",
-      "largest visible change that --effects auto may skip: CIEDE2000, 95th percentile of 8x8 block means (default: "
-      "0.5)",
-      [&args](const std::string& text) {
-        args.given.emplace_back("--tolerance");
-        return store_number(text, {1e-3, 100, "is not a colour difference"}, args.choice.tolerance);
-      });
-  add_text(
-      app, "--dimming", "SHARE",
-      "darkness of the result: 0 is normal exposure, 1 as dark as the scene relative to an indoor 100 cd/m2 (default: "
-      "0.4; automatic exposure only)",
-      [&args](const std::string& text) {
-        args.given.emplace_back("--dimming");
-        return store_number(text, {0, 1, "is not a fraction"}, args.choice.dimming);
-      });
+  add_text(app, "--effects", "auto|all|none|LIST",
+           fmt::format("corrections and vision effects to apply: auto (those that are visible in this image, without "
+                       "glare and visual-noise), all, none, or a list of vision effects ({}) (default: auto)",
+                       fmt::join(isp::night_effect_names, ", ")),
+           [&args](const std::string& text) {
+             args.given.emplace_back("--effects");
+             return set_effects(text, args.choice);
+           });
+  add_text(app, "--tolerance", "DELTA_E",
+           "largest change of the image by steps that --effects auto leaves out: CIEDE2000 of 8x8 block means, 95th "
+           "percentile (default: 0.5)",
+           [&args](const std::string& text) {
+             args.given.emplace_back("--tolerance");
+             return store_number(text, {1e-3, 100, "", "is not a colour difference"}, args.choice.tolerance);
+           });
+  add_text(app, "--dimming", "FRACTION",
+           "darkness of the image, 0 (normal exposure) to 1 (as dark as the scene compared with 100 cd/m2); for "
+           "automatic exposure (default: 0.4)",
+           [&args](const std::string& text) {
+             args.given.emplace_back("--dimming");
+             return store_number(text, {0, 1, "", "is not a fraction"}, args.choice.dimming);
+           });
 }
 
 }  // namespace
@@ -151,34 +125,34 @@ void add_look(CLI::App& app, LookArgs& args) {
   for (const isp::AppearanceModel& model : isp::appearance_models()) {
     models += (models.empty() ? "" : ", ") + std::string(model.name);
   }
-  add_text(
-      app, "--look", "camera|eye|MODEL",
-      "normal rendering (camera, default), as a dark-adapted observer on site would have seen it (eye), or colours by "
-      "a published model (" +
-          models + ")",
-      [&args, models](const std::string& text) -> Wrong {
-        args.choice.model.clear();
-        if (text == "camera" || text == "eye") {
-          args.choice.look = text == "eye" ? isp::Look::eye : isp::Look::camera;
-          return std::nullopt;
-        }
-        if (!isp::appearance_model_named(text)) return "is none of camera, eye, " + models;
-        args.choice.look = isp::Look::model;
-        args.choice.model = text;
-        return std::nullopt;
-      });
+  add_text(app, "--look", "camera|eye|MODEL",
+           "rendering: normal (camera, default), as an observer on site would perceive the scene (eye), or by a "
+           "published model of colour appearance (" +
+               models + ")",
+           [&args, models](const std::string& text) -> ArgumentError {
+             args.choice.model.clear();
+             if (text == "camera" || text == "eye") {
+               args.choice.look = text == "eye" ? isp::Look::eye : isp::Look::camera;
+               return std::nullopt;
+             }
+             if (!isp::appearance_model_named(text)) return "is none of camera, eye, " + models;
+             args.choice.look = isp::Look::model;
+             args.choice.model = text;
+             return std::nullopt;
+           });
   add_scene(app, args);
   add_light(app, args);
   add_effects(app, args);
   add_text(app, "--noise-limit", "off|LIGHTNESS",
-           "largest CIE L* of noise in even areas of the image: shadows whose noise would exceed it are brightened "
-           "less (default: off, with --look eye 2)",
-           [&args](const std::string& text) -> Wrong {
+           "largest noise in even areas of the image, as CIE L*; noisier shadows are brightened less (default: off; "
+           "with --look eye 2)",
+           [&args](const std::string& text) -> ArgumentError {
              args.noise_limit_given = true;
              args.choice.noise_limit.reset();
              if (text == "off") return std::nullopt;
              double limit = 0;
-             if (auto wrong = store_number(text, {1e-3, 100, "is neither off nor a lightness"}, limit)) return wrong;
+             if (auto wrong = store_number(text, {1e-3, 100, "", "is neither off nor a lightness"}, limit))
+               return wrong;
              args.choice.noise_limit = limit;
              return std::nullopt;
            });
@@ -186,16 +160,10 @@ void add_look(CLI::App& app, LookArgs& args) {
                  "coefficients of Shin's model for --look shin and --display-luminance: lines of E, alpha, beta, l, a, "
                  "m, b (default: the substitute SHIN-SUB-1)")
       ->type_name("FILE");
-  add_text(app, "--display-luminance", "CD_M2",
-           "luminance of white of the intended display: compensates for the loss of colour perception compared with "
-           "displays of 250 cd/m2 (default: no change)",
-           [&args](const std::string& text) -> Wrong {
-             double luminance = 0;
-             if (auto wrong = store_number(text, {1e-3, 1e5, "is not a luminance in cd/m2", "cd/m2"}, luminance))
-               return wrong;
-             args.display_cd_m2 = luminance;
-             return std::nullopt;
-           });
+  add_text(
+      app, "--display-luminance", "CD_M2",
+      "luminance of white of a dim display, whose loss of perceived colour is compensated for (default: no change)",
+      store_within({1e-3, 1e5, "cd/m2", "is not a luminance"}, args.display_cd_m2));
 }
 
 void add_seeing_map(CLI::App& app, LookArgs& args) {
@@ -231,38 +199,26 @@ std::optional<std::string> complete_look(const LookArgs& args, Planner planner, 
 
 namespace {
 
-constexpr double min_budget = 1e-3, max_budget = 1e9;
+constexpr NumberRange budget_ms_range{1e-3, 1e9, "ms"}, budget_mpps_range{1e-3, 1e9, "MP/s"};
 
 bool is_given(const LookArgs& look, const char* option) {
   return std::ranges::find(look.given, option) != look.given.end();
 }
 
-void add_positive(CLI::App& app, const char* flag, const char* type, const char* unit, const char* help,
-                  std::optional<double>& out) {
-  add_text(app, flag, type, help, [&out, unit](const std::string& text) -> std::optional<std::string> {
-    out = quantity_of(text, unit);
-    if (out && *out >= min_budget && *out <= max_budget) return std::nullopt;
-    return "is not a number from 0.001 to 1e9";
-  });
-}
-
 }  // namespace
 
 void add_merge_budget(CLI::App& app, EffectsArgs& args) {
-  add_positive(app, "--budget-ms", "MS", "ms", "time for merging without reading files; decides on --align and --mean",
-               args.budget_ms);
+  add_text(app, "--budget-ms", "MS", "time limit for merging, without reading files: chooses --align and --mean",
+           store_within(budget_ms_range, args.budget_ms));
 }
 
 void add_budget(CLI::App& app, EffectsArgs& args) {
-  add_positive(app, "--budget-ms", "MS", "ms",
-               "time limit for developing each frame, from decoded codes to a finished image, without reading and "
-               "writing files: chooses the most accurate plan that is predicted to fit, or with --tolerance the "
-               "fastest within it. Times are rough estimates until bench --calibrate-cost has measured this machine. "
-               "The load of the machine is measured before each file, which takes 0.3 to 0.5 s more. Files are "
-               "processed one at a time. With --merge the limit includes merging and developing",
-               args.budget_ms);
-  add_positive(app, "--budget-mpps", "MP_PER_S", "MP/s", "time limit like --budget-ms, in megapixels per second",
-               args.budget_mpps);
+  add_text(app, "--budget-ms", "MS",
+           "time limit for each frame, without reading and writing files: chooses the most accurate plan that is "
+           "predicted to fit, or with --tolerance the fastest within it; with --merge for merging and developing",
+           store_within(budget_ms_range, args.budget_ms));
+  add_text(app, "--budget-mpps", "MP_PER_S", "time limit for each frame, as a speed in megapixels per second",
+           store_within(budget_mpps_range, args.budget_mpps));
 }
 
 std::optional<std::string> complete_effects(const LookArgs& look, EffectsArgs& args) {

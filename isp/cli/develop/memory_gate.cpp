@@ -102,7 +102,7 @@ void MemoryGate::leave() {
   changed_.notify_all();
 }
 
-int MemoryGate::files_at_a_time(int wanted) const {
+int MemoryGate::parallel_files(int wanted) const {
   const std::lock_guard lock(mutex_);
   return std::min(wanted, capacity());
 }

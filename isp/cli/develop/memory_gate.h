@@ -26,7 +26,7 @@ class MemoryGate {
   void report_size(std::size_t bytes);
   void leave();
   /// Returns how many of the wanted files fit in memory at a time; 1 until the first size is known.
-  int files_at_a_time(int wanted) const;
+  int parallel_files(int wanted) const;
 
   /// Calls enter() and leave() of a gate, if it is not null.
   class Entry {

@@ -34,7 +34,7 @@ namespace {
 constexpr double used_memory = 0.8;  // of the available: estimates are not exact, and others need some too
 
 /// Reports an existing output before any work is done; the writer of the file checks again.
-Result<void> check_free(const std::string& output, isp::Overwrite overwrite) {
+Result<void> check_output_is_free(const std::string& output, isp::Overwrite overwrite) {
   std::error_code ignored;
   if (is_standard_stream(output) || overwrite == isp::Overwrite::yes || !std::filesystem::exists(output, ignored))
     return {};
@@ -146,7 +146,7 @@ Result<RawBatch> make_batch(const DevelopArgs& args, isp::DevelopOptions options
 
 Result<ReadyFrame> read_frame(const RawBatch& batch, const Job& job, Executor& executor, isp::StageClock& clock) {
   for (const std::string& output : job.output.empty() ? std::vector<std::string>() : files_of(batch, job)) {
-    if (const auto free = check_free(output, job.overwrite); !free) return tl::make_unexpected(free.error());
+    if (const auto free = check_output_is_free(output, job.overwrite); !free) return tl::make_unexpected(free.error());
   }
   bool without_dark = false;
   const auto subtract = [&](RawFrame& mosaic) {
@@ -247,7 +247,7 @@ class BatchRun {
     std::optional<PoolExecutor> executor;
     for (int i = next_++; i < files_; i = next_++) {
       const MemoryGate::Entry entry(batch_.memory.get());
-      const int threads = threads_of_each(batch_.memory ? batch_.memory->files_at_a_time(workers) : workers);
+      const int threads = threads_of_each(batch_.memory ? batch_.memory->parallel_files(workers) : workers);
       if (!executor || executor->width() != threads) executor.emplace(threads);
       finish(i, outcome_of(batch_.jobs[i], *executor));
     }

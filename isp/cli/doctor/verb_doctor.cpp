@@ -279,7 +279,7 @@ int run_doctor(const std::vector<std::string>& words) {
       "lowlux doctor");
   bool json = false;
   app.add_flag("--json", json, "print JSON instead of text");
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   const std::vector<InstalledPart> parts = find_installation();
   json ? print_json(parts) : print_parts(parts);
   return std::ranges::any_of(parts, [](const auto& part) { return part.state == State::broken; }) ? exit_failed

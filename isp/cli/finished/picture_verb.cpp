@@ -42,10 +42,10 @@ int run_picture_verb(const PictureVerb& verb, const PictureWork& work) {
   if (!format) return print_usage_error(verb.name, format.error(), object_if(verb.json));
   const Result<PictureKind> kind = picture_kind(*format, verb.bits, std::nullopt);
   if (!kind) return print_usage_error(verb.name, kind.error(), object_if(verb.json), verb.defaults);
-  if (const std::string wrong = wrong_names({verb.output}, verb.inputs); !wrong.empty()) {
+  if (const std::string wrong = file_name_error({verb.output}, verb.inputs); !wrong.empty()) {
     return print_usage_error(verb.name, {ErrorCode::invalid_argument, wrong, "-o"}, object_if(verb.json));
   }
-  if (const auto place = check_place(verb.output, verb.force); !place) return failed(verb, place.error());
+  if (const auto place = check_output_path(verb.output, verb.force); !place) return failed(verb, place.error());
   PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));
   const Result<std::vector<std::string>> warnings = work(*kind, executor);
   if (!warnings) return failed(verb, warnings.error());

@@ -45,28 +45,20 @@ Parsed<ResaturateArgs> parse_resaturate(const std::vector<std::string>& words) {
            [&args](const std::string& text) { return set_codes(text, args); });
   add_text(app, "--black-area", "X,Y,WIDTH,HEIGHT", "black point: the mean of this area of the image, in pixels",
            [&args](const std::string& text) { return set_area(text, args); });
-  add_text(app, "--chroma-noise", "SHARE",
-           "standard deviation of a pixel's chroma, relative to white (default: measured on the image); larger values "
-           "fade uncertain colour in the dark more",
-           [&args](const std::string& text) -> std::optional<std::string> {
-             args.chroma_noise = number_of(text);
-             if (!args.chroma_noise || *args.chroma_noise < 0 || *args.chroma_noise > 1) return "is not within 0 to 1";
-             return std::nullopt;
-           });
-  add_text(app, "--prior", "STD", "expected colourfulness of scenes: standard deviation of x and y (default 0.065)",
-           [&args](const std::string& text) -> std::optional<std::string> {
-             args.prior_std = number_of(text).value_or(0);
-             if (args.prior_std < 0.001 || args.prior_std > 1) return "is not within 0.001 to 1";
-             return std::nullopt;
-           });
-  app.add_option("--radius", args.radius, "radius in pixels over which the brightness is averaged (default 4)")
+  add_text(app, "--chroma-noise", "FRACTION",
+           "standard deviation of the chroma of a pixel, relative to white; larger values fade more colour (default: "
+           "measured on the image)",
+           store_within({0, 1}, args.chroma_noise));
+  add_text(app, "--prior", "STD", "expected standard deviation of the chromaticities x and y of scenes (default 0.065)",
+           store_within({0.001, 1}, args.prior_std));
+  app.add_option("--radius", args.radius, "radius of the average of brightness in pixels (default 4)")
       ->check(CLI::Range(0, 64));
   add_bits(app, args.bits);
   app.add_option("--quality", args.jpeg_quality, "JPEG quality, 1 to 100 (default 92)")->check(CLI::Range(1, 100));
   app.add_flag("--force", args.force, "overwrite a file that exists");
   app.add_flag("--json", args.json, "print JSON instead of text");
   app.add_flag("--quiet", args.quiet, "print no warnings and no text");
-  if (const auto code = parse_words(app, words, &args.defaults)) return *code;
+  if (const auto code = parse_arguments(app, words, &args.defaults)) return *code;
   if (args.black_codes.has_value() == args.black_area.has_value()) {
     return refuse(app, "give either --black R,G,B or --black-area, an area without light");
   }

@@ -47,7 +47,7 @@ Parsed<RetargetArgs> parse_retarget(const std::vector<std::string>& words) {
   app.add_flag("--force", args.force, "overwrite a file that exists");
   app.add_flag("--json", args.json, "print JSON instead of text");
   app.add_flag("--quiet", args.quiet, "print no warnings and no text");
-  if (const auto code = parse_words(app, words, &args.defaults)) return *code;
+  if (const auto code = parse_arguments(app, words, &args.defaults)) return *code;
   if (const auto possible = isp::retargeting(args.options); !possible) return refuse(app, possible.error().message);
   if (isp::coefficients_name(args.options).empty() && (!args.coefficients.empty() || app.count("--units") > 0)) {
     return refuse(app, "--coefficients and --units: the model " + std::string(isp::name_of(args.options.method)) +

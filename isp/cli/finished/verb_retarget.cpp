@@ -60,7 +60,7 @@ void print_json(const RetargetArgs& args, const RetargetOutcome& done) {
                               {"source_cd_m2", o.source_cd_m2},
                               {"display_cd_m2", o.display_cd_m2},
                               {"display_black_cd_m2", o.display_black_cd_m2},
-                              {"share_beyond_gamut", done.made.fraction_held},
+                              {"fraction_beyond_gamut", done.made.fraction_outside_gamut},
                               {"table_levels", done.made.levels},
                               {"table_mean_ciede2000", done.made.error.mean_ciede2000},
                               {"table_max_ciede2000", done.made.error.max_ciede2000},
@@ -82,8 +82,8 @@ void print_retargeted(const RetargetArgs& args, const RetargetOutcome& done) {
     lines.add("coefficients", fmt::format("{}, by {}", done.coefficients,
                                           o.units == isp::ShinUnits::lux ? "the lux on white" : "luminance"));
   }
-  lines.add("beyond gamut",
-            fmt::format("{:.1f} % of the pixels: nearest colour of the display", 100 * done.made.fraction_held));
+  lines.add("beyond gamut", fmt::format("{:.1f} % of the pixels: nearest colour of the display",
+                                        100 * done.made.fraction_outside_gamut));
   lines.add("table", fmt::format("{0} x {0} x {0}, error {1:.2f} CIEDE2000 on average, {2:.1f} at most",
                                  done.made.levels, done.made.error.mean_ciede2000, done.made.error.max_ciede2000));
   print_out(fmt::format("{}\n{}", one_line(args.output), lines.text()));

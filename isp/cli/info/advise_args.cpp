@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "isp/cli/shared/option_values.h"
+#include "isp/cli/shared/sensor_options.h"
 
 namespace lowlux::cli {
 namespace {
@@ -41,28 +42,6 @@ void add_camera(CLI::App& app, AdviseArgs& args) {
   add_optional(app, "--temperature", "C", "temperature of the sensor (default: the file's, or 20)", args.temperature_c);
 }
 
-void add_figures(CLI::App& app, AdviseArgs& args) {
-  isp::SensorFigures& f = args.figures;
-  add_optional(app, "--system-gain", "DN_PER_E", "system gain in DN per electron; with --gain", f.system_gain_dn_per_e);
-  add_optional(app, "--read-noise", "E", "read noise, standard deviation in electrons; with --gain", f.read_noise_e);
-  add_optional(app, "--iso", "ISO", "saturation-based speed; with --gain", f.iso);
-  add_optional(app, "--full-well", "E", "charge of a full pixel", f.full_well_e);
-  app.add_option("--bits", f.bits, "number of bits of the converter")->type_name("N")->group(group);
-  add_text(app, "--dark-current", "E_PER_S[,G,B]", "dark current of all channels, or of red, green and blue",
-           [&f](const std::string& text) -> std::optional<std::string> {
-             const auto n = numbers_of(text, 3);
-             if (!n || n->size() == 2) return "is neither one number nor three";
-             f.dark_current_e_per_s = std::array{n->front(), n->size() == 3 ? (*n)[1] : n->front(), n->back()};
-             return std::nullopt;
-           })
-      ->group(group);
-  add_optional(app, "--pixel-pitch", "UM", "side of a pixel", f.pixel_pitch_um);
-  add_optional(app, "--peak-qe", "RATIO", "largest quantum efficiency, electrons per photon",
-               f.peak_quantum_efficiency);
-  add_optional(app, "--white-luminance", "CD_M2", "luminance of a white that fills a pixel in 1 s",
-               args.white_luminance_cd_m2);
-}
-
 void add_scene(CLI::App& app, AdviseArgs& args) {
   add_optional(app, "--luminance", "CD_M2",
                "luminance of the mid tone (default: the median of the file's green pixels)", args.midtone_cd_m2);
@@ -84,14 +63,13 @@ void add_advise(CLI::App& app, AdviseArgs& args) {
                                      "and the exposures of frames for lowlux merge")
                             ->group(group);
   add_camera(app, args);
-  add_figures(app, args);
+  add_sensor_figures(app, group, args.figures, args.white_luminance_cd_m2);
   add_scene(app, args);
   add_optional(app, "--max-exposure", "S", "longest exposure", args.longest_exposure_s);
-  add_optional(app, "--motion", "PX_PER_S", "speed of the scene; with --blur", args.speed_px_per_s);
-  add_optional(app, "--blur", "PX", "largest displacement of the scene during the exposure; with --motion",
-               args.blur_px);
-  add_number(app, "--clip", "SHARE", "fraction of pixels that may clip (default 0.001; without --sensor 0.00001)",
-             [&args](double share) { args.clipped_share = share; })
+  add_optional(app, "--motion", "PX_PER_S", "speed of motion in the scene; with --blur", args.speed_px_per_s);
+  add_optional(app, "--blur", "PX", "largest motion blur in pixels; with --motion", args.blur_px);
+  add_number(app, "--clip", "FRACTION", "largest fraction of clipped pixels (default 0.001; without --sensor 0.00001)",
+             [&args](double share) { args.clipped_fraction = share; })
       ->group(group);
   add_optional(app, "--snr", "DB",
                "without --sensor: signal-to-noise ratio of the darkest tenth after merging (default 20)", args.snr_db);
@@ -125,7 +103,7 @@ std::string validate_bracket(const CLI::App& app, const AdviseArgs& args, std::s
   }
   if (files == 0) return std::string("--advise without a raw file") + needs_sensor;
   if (args.snr_db && !(*args.snr_db >= -20 && *args.snr_db <= 60)) return "--snr is not within -20 to 60 dB";
-  if (args.clipped_share && !(*args.clipped_share >= 1e-9 && *args.clipped_share <= 0.5)) {
+  if (args.clipped_fraction && !(*args.clipped_fraction >= 1e-9 && *args.clipped_fraction <= 0.5)) {
     return "--clip is not within 1e-9 to 0.5";
   }
   if (args.longest_exposure_s && !(*args.longest_exposure_s > 0)) return "--max-exposure is not above 0";

@@ -30,8 +30,8 @@ struct AdviseArgs {
   std::optional<double> speed_px_per_s;
   std::optional<double> blur_px;
   std::optional<double> temperature_c;
-  std::optional<double> clipped_share;
-  std::optional<double> snr_db;  // of the darkest tenth of a raw file, once frames are merged
+  std::optional<double> clipped_fraction;
+  std::optional<double> snr_db;  // signal-to-noise ratio of the darkest tenth of a raw file, once frames are merged
   double patch_pixels = 256;
   int frames = 1;
   std::string report;  // HTML page to write; empty: none

@@ -116,7 +116,8 @@ Result<BracketCase> bracket_case(const AdviseArgs& args, RawFrame& frame) {
   PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64));
   const isp::DevelopOptions options = measuring_options();
   if (const auto noise = find_noise(options, {}, frame, executor); !noise) return tl::make_unexpected(noise.error());
-  const auto scene = isp::measure_bracket_scene(frame, options, args.clipped_share.value_or(default_clipped), executor);
+  const auto scene =
+      isp::measure_bracket_scene(frame, options, args.clipped_fraction.value_or(default_clipped), executor);
   if (!scene) return tl::make_unexpected(scene.error());
   const Result<double> longest_s = longest_exposure_s(args, frame);
   if (!longest_s) return tl::make_unexpected(longest_s.error());

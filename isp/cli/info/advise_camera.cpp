@@ -28,7 +28,7 @@
 namespace lowlux::cli {
 namespace {
 
-std::string cure_of(const std::vector<std::string_view>& near) {
+std::string suggestion_for(const std::vector<std::string_view>& near) {
   if (near.empty()) return "`lowlux simulate --list` names them";
   return fmt::format("near it: {}", fmt::join(near, ", "));
 }
@@ -49,7 +49,7 @@ void note_unknown(const isp::GainSetting& gain, std::vector<std::string>& notes)
 Result<Spectrum> light_of(const std::string& name) {
   if (auto light = isp::light_named(name)) return *std::move(light);
   return fail(ErrorCode::invalid_argument,
-              fmt::format("unknown light '{}'; {}", name, cure_of(near_matches(name, isp::light_names()))),
+              fmt::format("unknown light '{}'; {}", name, suggestion_for(near_matches(name, isp::light_names()))),
               "--illuminant");
 }
 
@@ -61,7 +61,7 @@ Result<Matrix3> matrix_of(const std::string& camera, const Spectrum& light) {
   if (!sensitivity) {
     return fail(ErrorCode::invalid_argument,
                 fmt::format("no spectral sensitivities of '{}' are known; {}", camera,
-                            cure_of(near_matches(camera, isp::camera_names()))),
+                            suggestion_for(near_matches(camera, isp::camera_names()))),
                 "--camera");
   }
   const auto calibration = isp::fit_calibration(*sensitivity, light, isp::ForwardMatrix::fit);
@@ -212,12 +212,12 @@ Result<void> take_profile(const AdviseArgs& args, const Spectrum& light, const i
 
 Result<void> take_scene(const AdviseArgs& args, const RawFrame* frame, AdviceCase& out) {
   isp::AdviceRequest& r = out.request;
-  r.clipped_share = args.clipped_share.value_or(r.clipped_share);
+  r.clipped_fraction = args.clipped_fraction.value_or(r.clipped_fraction);
   std::optional<double> midtone = args.midtone_cd_m2, highlight = args.highlight_cd_m2;
   if (frame != nullptr && (!midtone || (!highlight && !args.highlight_ratio))) {
     FrameInfo info = frame->raw.info;
     if (args.f_number) info.f_number = args.f_number;
-    const auto seen = raw_luminance(*frame, info, r.clipped_share);
+    const auto seen = raw_luminance(*frame, info, r.clipped_fraction);
     if (!seen) return tl::make_unexpected(seen.error());
     if (!midtone) midtone = seen->median_cd_m2;
     if (!highlight && !args.highlight_ratio) highlight = std::max(seen->highlight_cd_m2, *midtone);

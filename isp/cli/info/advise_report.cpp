@@ -193,7 +193,7 @@ std::string advice_json(const AdviceCase& asked, const isp::ExposureAdvice& advi
                   {"midtone_cd_m2", r.midtone_cd_m2},
                   {"highlight_cd_m2", r.highlight_cd_m2},
                   {"longest_exposure_s", r.longest_exposure_s},
-                  {"clipped_share", r.clipped_share},
+                  {"clipped_fraction", r.clipped_fraction},
                   {"temperature_c", r.temperature_c},
                   {"patch_pixels", r.patch_pixels},
                   {"frames", r.frames},

@@ -9,24 +9,6 @@
 #include "isp/cli/shared/option_values.h"
 
 namespace lowlux::cli {
-namespace {
-
-/// Adds an option whose value is a number from `low` to `high`.
-void add_within(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help, double low,
-                double high, std::function<void(double)> store) {
-  add_text(app, flag, type, help,
-           [low, high, store = std::move(store)](const std::string& text) -> std::optional<std::string> {
-             const auto number = number_of(text);
-             if (!number || !(*number >= low && *number <= high)) {
-               return fmt::format("is not within {} to {}", low, high);
-             }
-             store(*number);
-             return std::nullopt;
-           });
-}
-
-}  // namespace
-
 void add_merging(CLI::App& app, MergeArgs& args) {
   using Alignment = std::optional<isp::MergeAlignment>;
   isp::MergeOptions& options = args.options;
@@ -41,11 +23,11 @@ void add_merging(CLI::App& app, MergeArgs& args) {
       "how frames are aligned (auto: subpixel if the camera moved, else none)");
   add_choice<bool>(
       app, "--foreground", {{"move", false}, {"keep", true}}, [&options](bool keep) { options.keep_foreground = keep; },
-      "with --align stars: move a foreground at rest along with the stars, or keep its position");
-  add_within(app, "--drizzle", "SCALE", "make a LinearRaw image of measured colours, SCALE times as wide (1 to 3)", 1,
-             3, [&args](double scale) { args.drizzle_scale = scale; });
-  add_within(app, "--pixfrac", "SIDE", "with --drizzle: side of a drop in pixels (default 1)", 0.05, 1,
-             [&args](double side) { args.pixfrac = side; });
+      "with --align stars: align the foreground like the stars (move), or keep its position (default: move)");
+  add_text(app, "--drizzle", "SCALE", "drizzle to a LinearRaw image of SCALE times the width and height (1 to 3)",
+           store_within({1, 3}, args.drizzle_scale));
+  add_text(app, "--pixfrac", "SIDE", "with --drizzle: side of the square onto which each pixel is shrunk (default 1)",
+           store_within({0.05, 1}, args.pixfrac));
   add_choice<bool>(
       app, "--mean", {{"robust", true}, {"plain", false}}, [&options](bool robust) { options.robust = robust; },
       "average only content that matches the other frames (robust), or everything (default: robust; with --budget-ms "
@@ -54,8 +36,8 @@ void add_merging(CLI::App& app, MergeArgs& args) {
                  "raw file to which the others are aligned (default: the first; with --align stars the middle one; in "
                  "a bracket the longest exposure that is at most half saturated)")
       ->type_name("RAW");
-  add_within(app, "--false-alarm", "RATE", "fraction of a static scene that is left out by chance (default 0.001)",
-             1e-6, 0.5, [&options](double rate) { options.false_alarm = rate; });
+  add_text(app, "--false-alarm", "RATE", "fraction of a static scene that is left out by chance (default 0.001)",
+           store_within({1e-6, 0.5}, options.false_alarm));
 }
 
 std::optional<std::string> settle_merging(MergeArgs& args, bool budgeted) {

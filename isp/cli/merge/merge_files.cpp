@@ -51,7 +51,7 @@ Result<std::vector<std::string>> files_to_merge(const DevelopArgs& args) {
 }
 
 Result<void> check_frames(const std::vector<std::string>& files, const MergeArgs& args) {
-  if (const std::string wrong = wrong_names({}, files); !wrong.empty()) {
+  if (const std::string wrong = file_name_error({}, files); !wrong.empty()) {
     return fail(ErrorCode::invalid_argument, wrong);
   }
   if (!args.reference.empty() && !reference_index(args, files)) {
@@ -99,7 +99,7 @@ Result<MergeReport> merge_files(const RawBatch& batch, const std::vector<std::st
   auto merged = isp::merge_frames(static_cast<int>(inputs.size()), read_input, options, executor,
                                   [&](double fraction) { progress.reach(0.9 * fraction); });
   if (!merged) return tl::make_unexpected(merged.error());
-  if (auto warning = little_used_warning(inputs, *merged)) merged->warnings.push_back(*std::move(warning));
+  if (auto warning = unmatched_frames_warning(inputs, *merged)) merged->warnings.push_back(*std::move(warning));
   return MergeReport{inputs, *std::move(merged), std::move(origin)};
 }
 

@@ -66,7 +66,8 @@ nlohmann::ordered_json budget_json(const isp::MergePlan& plan) {
 
 }  // namespace
 
-std::optional<std::string> little_used_warning(const std::vector<std::string>& inputs, const isp::MergedRaw& merged) {
+std::optional<std::string> unmatched_frames_warning(const std::vector<std::string>& inputs,
+                                                    const isp::MergedRaw& merged) {
   std::string first;
   int count = 0;
   for (std::size_t i = 0; i < inputs.size(); ++i) {

@@ -17,7 +17,8 @@ struct MergeReport {
 };
 
 /// Returns a warning of frames that were aligned, and match the reference nearly nowhere; nullopt if there are none.
-std::optional<std::string> little_used_warning(const std::vector<std::string>& inputs, const isp::MergedRaw& merged);
+std::optional<std::string> unmatched_frames_warning(const std::vector<std::string>& inputs,
+                                                    const isp::MergedRaw& merged);
 
 /// Returns how much of each frame was used, and why: as text, and as a JSON object.
 std::string merge_text(const MergeReport& report);

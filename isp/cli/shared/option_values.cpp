@@ -124,7 +124,7 @@ std::optional<double> quantity_of(std::string_view text, std::string_view unit) 
   return *numerator / *denominator;
 }
 
-std::vector<std::string> words_of(const std::string& text) {
+std::vector<std::string> split_at_commas(const std::string& text) {
   std::vector<std::string> words;
   for (std::size_t start = 0; start <= text.size();) {
     const std::size_t end = std::min(text.find(',', start), text.size());
@@ -136,7 +136,7 @@ std::vector<std::string> words_of(const std::string& text) {
 
 std::optional<std::vector<double>> numbers_of(const std::string& text, std::size_t most) {
   std::vector<double> numbers;
-  for (const std::string& word : words_of(text)) {
+  for (const std::string& word : split_at_commas(text)) {
     const auto number = number_of(word);
     if (!number || numbers.size() == most) return std::nullopt;
     numbers.push_back(*number);
@@ -167,26 +167,23 @@ CLI::Option* add_bits(CLI::App& app, std::optional<int>& bits) {
 
 CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
                         std::function<void(double)> store) {
-  return add_text(
-      app, flag, type, help,
-      [store = std::move(store), unit = unit_of(type)](const std::string& text) -> std::optional<std::string> {
-        const auto number = quantity_of(text, unit);
-        if (!number) return "is not a finite number";
-        store(*number);
-        return std::nullopt;
-      });
-}
-
-CLI::Option* add_number_within(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
-                               double low, double high, double& value) {
   return add_text(app, flag, type, help,
-                  [low, high, unit = unit_of(type), &value](const std::string& text) -> std::optional<std::string> {
+                  [store = std::move(store), unit = unit_of(type)](const std::string& text) -> ArgumentError {
                     const auto number = quantity_of(text, unit);
-                    if (!number || *number < low || *number > high)
-                      return fmt::format("is not a number of {:g} to {:g}", low, high);
-                    value = *number;
+                    if (!number) return "is not a finite number";
+                    store(*number);
                     return std::nullopt;
                   });
+}
+
+ArgumentError store_number(const std::string& text, const NumberRange& range, double& out) {
+  const std::optional<double> number = quantity_of(text, range.unit);
+  if (!number || !(*number >= range.low && *number <= range.high)) {
+    return fmt::format("{} from {:g} to {:g}{}{}", range.is_not, range.low, range.high, *range.unit == 0 ? "" : " ",
+                       range.unit);
+  }
+  out = *number;
+  return std::nullopt;
 }
 
 namespace {
@@ -257,8 +254,8 @@ const CLI::Option* empty_option(const CLI::App& app) {
 
 }  // namespace
 
-std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words, Defaults* used,
-                               const std::set<std::string>& left_out) {
+std::optional<int> parse_arguments(CLI::App& app, const std::vector<std::string>& words, Defaults* used,
+                                   const std::set<std::string>& left_out) {
   app.set_help_flag("-h,--help", "print the most used options")->group("General");
   app.set_help_all_flag("--help-all", "print all options")->group("General");
   bool no_config = false;  // find_defaults looks for the flag itself: defaults are arguments of the parser

@@ -24,6 +24,9 @@ namespace lowlux::cli {
 
 struct Defaults;
 
+/// States what is wrong with an argument, to be printed after it; nullopt if it is valid.
+using ArgumentError = std::optional<std::string>;
+
 /// Returns whether two texts differ at most in the case of letters.
 bool same_letters(std::string_view a, std::string_view b);
 
@@ -38,7 +41,7 @@ std::optional<double> quantity_of(std::string_view text, std::string_view unit);
 std::optional<std::vector<double>> numbers_of(const std::string& text, std::size_t most);
 
 /// Returns words separated by commas.
-std::vector<std::string> words_of(const std::string& text);
+std::vector<std::string> split_at_commas(const std::string& text);
 
 /// Holds the values of an option by name, in the order in which help lists them.
 template <class Enum>
@@ -66,7 +69,7 @@ std::string joined(const Names<Enum>& names, std::string_view separator = ", ") 
 }
 
 /// Stores the text of an option. @return the error, or nothing
-using OptionStore = std::function<std::optional<std::string>(const std::string&)>;
+using OptionStore = std::function<ArgumentError(const std::string&)>;
 
 /// States what a comma in a value that is refused can be.
 enum class Comma : std::uint8_t { decimal, separator };
@@ -79,22 +82,39 @@ CLI::Option* add_text(CLI::App& app, const std::string& flag, const std::string&
 CLI::Option* add_number(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
                         std::function<void(double)> store);
 
-/// Adds an option that takes a quantity from `low` to `high`, as add_number does. CLI::Range accepts NaN: it is for
-/// whole numbers only.
-CLI::Option* add_number_within(CLI::App& app, const std::string& flag, const std::string& type, const std::string& help,
-                               double low, double high, double& value);
+/// Describes the values that an option accepts. CLI::Range is not used for them, because it accepts NaN.
+struct NumberRange {
+  double low;
+  double high;
+  const char* unit = "";                   // unit that may follow the number
+  const char* is_not = "is not a number";  // beginning of the error
+};
+
+/// Stores a number that is within a range. @return the error, or nothing
+ArgumentError store_number(const std::string& text, const NumberRange& range, double& out);
+
+/// Returns a store for an option that takes a number within a range.
+/// @param out  a double, or an optional one
+template <class Out>
+OptionStore store_within(const NumberRange& range, Out& out) {
+  return [range, &out](const std::string& text) -> ArgumentError {
+    double number = 0;
+    if (auto error = store_number(text, range, number)) return error;
+    out = number;
+    return std::nullopt;
+  };
+}
 
 /// Adds an option whose values are names, which are its placeholder; the message for any other lists them.
 template <class Enum, class Store>
 CLI::Option* add_choice(CLI::App& app, const std::string& flag, const Names<Enum>& names, Store store,
                         const std::string& help) {
-  return add_text(app, flag, joined(names, "|"), help,
-                  [names, store](const std::string& name) -> std::optional<std::string> {
-                    const auto found = names.find(name);
-                    if (found == names.end()) return "is none of " + joined(names);
-                    store(found->second);
-                    return std::nullopt;
-                  });
+  return add_text(app, flag, joined(names, "|"), help, [names, store](const std::string& name) -> ArgumentError {
+    const auto found = names.find(name);
+    if (found == names.end()) return "is none of " + joined(names);
+    store(found->second);
+    return std::nullopt;
+  });
 }
 
 /// Adds an option for a seed, a whole number of 64 bits.
@@ -113,7 +133,7 @@ int refuse(const CLI::App& app, const std::string& wrong);
 /// printed
 /// @param used      receives the defaults of the user's file that complete the arguments; nullptr: not of interest
 /// @param left_out  flags whose defaults are not used
-std::optional<int> parse_words(CLI::App& app, const std::vector<std::string>& words, Defaults* used = nullptr,
-                               const std::set<std::string>& left_out = {});
+std::optional<int> parse_arguments(CLI::App& app, const std::vector<std::string>& words, Defaults* used = nullptr,
+                                   const std::set<std::string>& left_out = {});
 
 }  // namespace lowlux::cli

@@ -126,7 +126,7 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
                             is_standard_stream(args.output) ? "FOLDER" : args.output),
                 "-o");
   }
-  if (const auto wrong = wrong_streams(args)) return fail(ErrorCode::invalid_argument, *wrong);
+  if (const auto wrong = stream_error(args)) return fail(ErrorCode::invalid_argument, *wrong);
   std::vector<Job> jobs;
   const OutputNames names(*inputs);
   std::map<std::string, std::string> input_of;  // by file that is written
@@ -204,7 +204,7 @@ bool options_contradict(const DevelopArgs& args) {
 
 namespace fs = std::filesystem;
 
-Result<void> check_place(const std::string& file, bool force) {
+Result<void> check_output_path(const std::string& file, bool force) {
   std::error_code ignored;
   const fs::path folder = fs::path(file).parent_path();
   if (!folder.empty() && !fs::is_directory(folder, ignored)) {
@@ -225,7 +225,7 @@ bool same_name(const std::string& a, const std::string& b) {
   return a == b || fs::weakly_canonical(a, ignored) == fs::weakly_canonical(b, ignored);
 }
 
-std::string wrong_names(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
+std::string file_name_error(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
   std::map<fs::path, bool> is_output;
   const auto added = [&](const std::string& name, bool output) {
     std::error_code ignored;

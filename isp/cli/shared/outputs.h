@@ -55,13 +55,13 @@ bool options_contradict(const DevelopArgs& args);
 
 /// Checks before any work that a file can be written; the writers check again.
 /// Errors: its folder is missing; it is a folder itself; it exists, and `force` is not given.
-Result<void> check_place(const std::string& file, bool force);
+Result<void> check_output_path(const std::string& file, bool force);
 
 /// Returns whether two names refer to one file.
 bool same_name(const std::string& a, const std::string& b);
 
 /// Returns the error of files by their names alone: an output that is another output or an input, an input that is
 /// given twice. Empty names do not count. @return empty if there is no error
-std::string wrong_names(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
+std::string file_name_error(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
 
 }  // namespace lowlux::cli

@@ -104,7 +104,7 @@ Result<std::vector<std::string>> raw_files_of_lists(const std::vector<std::strin
   for (const std::string& argument : arguments) {
     std::error_code ignored;
     const bool one = fs::exists(argument, ignored);
-    for (const std::string& name : one ? std::vector<std::string>{argument} : words_of(argument)) {
+    for (const std::string& name : one ? std::vector<std::string>{argument} : split_at_commas(argument)) {
       auto found = raw_files_of(name, quiet);
       if (!found) return found;
       files.insert(files.end(), found->begin(), found->end());

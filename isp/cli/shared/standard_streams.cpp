@@ -18,7 +18,7 @@ Result<RawFrame> read_standard_input(const capture::XTransUse& use) {
   return capture::read_raw(*bytes, name, limits, use);
 }
 
-std::optional<std::string> wrong_streams(const DevelopArgs& args) {
+std::optional<std::string> stream_error(const DevelopArgs& args) {
   const auto streams = std::ranges::count_if(args.inputs, is_standard_stream);
   if (streams > 1) return "-: standard input is given twice";
   if (!is_standard_stream(args.output)) return std::nullopt;

@@ -19,6 +19,6 @@ Result<RawFrame> read_standard_input(const capture::XTransUse& x_trans_use = {})
 
 /// Returns the error of arguments that read standard input twice, or that write other things than one file to standard
 /// output, in one line; nullopt: there is none.
-std::optional<std::string> wrong_streams(const DevelopArgs& args);
+std::optional<std::string> stream_error(const DevelopArgs& args);
 
 }  // namespace lowlux::cli

@@ -12,14 +12,12 @@
 namespace lowlux::cli {
 namespace {
 
-using Wrong = std::optional<std::string>;
-
-constexpr const char* group = "Bursts of frames, with their motion in OUT.truth.json";
+constexpr const char* group = "Bursts (their motion is written to OUT.truth.json)";
 constexpr int default_reduction = 2;
 
 /// Stores X,Y.
 OptionStore pair_store(std::function<void(double, double)> store) {
-  return [store = std::move(store)](const std::string& text) -> Wrong {
+  return [store = std::move(store)](const std::string& text) -> ArgumentError {
     const auto numbers = numbers_of(text, 2);
     if (!numbers || numbers->size() != 2) return "is not X,Y in pixels";
     store((*numbers)[0], (*numbers)[1]);
@@ -27,7 +25,7 @@ OptionStore pair_store(std::function<void(double, double)> store) {
   };
 }
 
-Wrong set_bracket(const std::string& text, std::vector<double>& bracket_ev) {
+ArgumentError set_bracket(const std::string& text, std::vector<double>& bracket_ev) {
   const auto numbers = numbers_of(text, 100);
   if (!numbers) return "is not EV,EV... of 1 to 100 exposures";
   bracket_ev = *numbers;

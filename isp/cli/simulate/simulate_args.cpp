@@ -11,11 +11,10 @@
 
 #include "isp/base/text.h"
 #include "isp/cli/shared/option_values.h"
+#include "isp/cli/shared/sensor_options.h"
 
 namespace lowlux::cli {
 namespace {
-
-using Wrong = std::optional<std::string>;
 
 /// Returns an integer from min_side to max_side; 0 for other text.
 int side_of(const std::string& text) {
@@ -23,7 +22,7 @@ int side_of(const std::string& text) {
   return side >= min_side && side <= max_side && side == std::floor(side) ? static_cast<int>(side) : 0;
 }
 
-Wrong set_size(const std::string& text, SceneArgs& scene) {
+ArgumentError set_size(const std::string& text, SceneArgs& scene) {
   const std::size_t x = std::min(text.find('x'), text.size());
   scene.size_given = true;
   scene.width = side_of(text.substr(0, x));
@@ -35,8 +34,8 @@ Wrong set_size(const std::string& text, SceneArgs& scene) {
   return std::nullopt;
 }
 
-Wrong add_lamp(const std::string& text, SceneArgs& scene) {
-  const auto words = words_of(text);
+ArgumentError add_lamp(const std::string& text, SceneArgs& scene) {
+  const auto words = split_at_commas(text);
   constexpr const char* expected = "is not X,Y,LIGHT,LUMINANCE with a luminance of 0 to 1e12 cd/m2";
   if (words.size() != 4) return expected;
   const auto x = number_of(words[0]), y = number_of(words[1]), luminance = number_of(words[3]);
@@ -55,7 +54,7 @@ std::string no_effect(const std::string& word) {
 }
 
 /// Parses auto, all, none, or a list of names: photon-noise,dark-current... or all but some: all,-prnu or -prnu.
-Wrong set_effects(const std::string& text, capture::NoiseSourceChoice& choice) {
+ArgumentError set_effects(const std::string& text, capture::NoiseSourceChoice& choice) {
   if (text == "auto") {
     choice.tolerance = choice.tolerance.value_or(isp::Tolerance{});
     return std::nullopt;
@@ -63,7 +62,7 @@ Wrong set_effects(const std::string& text, capture::NoiseSourceChoice& choice) {
   const auto names = isp::effect_names();
   isp::NoiseSourceSet effects = text.starts_with('-') ? isp::NoiseSourceSet::all() : isp::NoiseSourceSet();
   isp::NoiseSourceSet named;
-  for (std::string word : words_of(text)) {
+  for (std::string word : split_at_commas(text)) {
     const bool without = word.starts_with('-');
     if (without) word.erase(0, 1);
     const auto found = std::find(names.begin(), names.end(), word);
@@ -89,7 +88,7 @@ Wrong set_effects(const std::string& text, capture::NoiseSourceChoice& choice) {
   return std::nullopt;
 }
 
-Wrong set_tolerance(const std::string& text, isp::Tolerance& tolerance) {
+ArgumentError set_tolerance(const std::string& text, isp::Tolerance& tolerance) {
   const auto numbers = numbers_of(text, 2);
   if (!numbers || (*numbers)[0] <= 0 || (numbers->size() == 2 && (*numbers)[1] <= 0)) {
     return "is not a positive DELTA_E or DELTA_E,RELATIVE_VARIANCE";
@@ -108,7 +107,7 @@ void add_scene(CLI::App& app, SceneArgs& s) {
            [&s](const std::string& text) { return set_size(text, s); });
   add_text(app, "--light", "NAME|FILE.csv",
            "light of charts and flats: a CIE illuminant or a lamp (--list), or a table file (default D65)",
-           [&s](const std::string& text) -> Wrong {
+           [&s](const std::string& text) -> ArgumentError {
              s.light = text;
              s.light_given = true;
              return std::nullopt;
@@ -132,32 +131,21 @@ void add_scene(CLI::App& app, SceneArgs& s) {
 }
 
 void add_figures(CLI::App& app, SimulateArgs& args) {
+  const char* const group = "Sensor figures";
   isp::SensorFigures& f = args.figures;
-  const auto figure = [&app](const std::string& flag, const std::string& type, const std::string& help,
-                             std::optional<double>& out) {
-    add_number(app, flag, type, help, [&out](double value) { out = value; })->group("Sensor figures");
+  add_sensor_figures(app, group, f, args.optics.white_luminance_cd_m2);
+  const auto figure = [&](const std::string& flag, const std::string& type, const std::string& help,
+                          std::optional<double>& out) {
+    add_number(app, flag, type, help, [&out](double value) { out = value; })->group(group);
   };
-  figure("--system-gain", "DN_PER_E", "system gain in DN per electron", f.system_gain_dn_per_e);
-  figure("--read-noise", "E", "read noise, standard deviation in electrons", f.read_noise_e);
-  figure("--full-well", "E", "charge of a full pixel", f.full_well_e);
-  app.add_option("--bits", f.bits, "number of bits of the converter")->group("Sensor figures");
   figure("--black-level", "DN", "black level (pedestal)", f.black_level_dn);
   figure("--white-level", "DN", "white level (largest code)", f.white_level_dn);
-  add_text(app, "--dark-current", "E_PER_S[,G,B]", "dark current of all channels, or of red, green and blue",
-           [&f](const std::string& text) -> Wrong {
-             const auto n = numbers_of(text, 3);
-             if (!n || n->size() == 2) return "is neither one number nor three";
-             f.dark_current_e_per_s =
-                 n->size() == 1 ? std::array{(*n)[0], (*n)[0], (*n)[0]} : std::array{(*n)[0], (*n)[1], (*n)[2]};
-             return std::nullopt;
-           })
-      ->group("Sensor figures");
-  const auto not_negative = [&app](const std::string& flag, const std::string& type, const std::string& help,
-                                   std::optional<double>& out) {
-    add_text(app, flag, type, help, [&out](const std::string& text) -> Wrong {
+  const auto not_negative = [&](const std::string& flag, const std::string& type, const std::string& help,
+                                std::optional<double>& out) {
+    add_text(app, flag, type, help, [&out](const std::string& text) -> ArgumentError {
       out = number_of(text);
-      return out && *out >= 0 ? Wrong() : "is not a number of at least 0";
-    })->group("Sensor figures");
+      return out && *out >= 0 ? ArgumentError() : "is not a number of at least 0";
+    })->group(group);
   };
   figure("--dark-temperature", "C", "temperature at which --dark-current is stated", f.dark_temperature_c);
   figure("--dark-doubling", "C", "temperature difference over which the dark current doubles", f.dark_doubling_c);
@@ -176,26 +164,21 @@ void add_figures(CLI::App& app, SimulateArgs& args) {
   figure("--glow", "E_PER_S", "amplifier glow: additional dark current at its source", f.glow_e_per_s);
   add_text(app, "--glow-position", "X,Y",
            "position of the source of the glow, in widths and heights (default 1,1: lower right corner)",
-           [&f](const std::string& text) -> Wrong {
+           [&f](const std::string& text) -> ArgumentError {
              const auto n = numbers_of(text, 2);
              if (!n || n->size() != 2) return "is not two numbers";
              f.glow_position = {(*n)[0], (*n)[1]};
              return std::nullopt;
            })
-      ->group("Sensor figures");
+      ->group(group);
   figure("--glow-length", "RATIO", "distance over which the glow falls by a factor e, in diagonals (default 0.1)",
          f.glow_length);
   figure("--row-noise", "E", "row noise, standard deviation in electrons", f.row_noise_e);
   figure("--column-noise", "E", "column noise, standard deviation in electrons", f.column_noise_e);
-  figure("--pixel-pitch", "UM", "side of a pixel", f.pixel_pitch_um);
-  figure("--peak-qe", "RATIO", "largest quantum efficiency, electrons per photon", f.peak_quantum_efficiency);
-  figure("--iso", "ISO", "saturation-based speed of the gain setting", f.iso);
-  figure("--white-luminance", "CD_M2", "luminance of a white that fills a pixel in 1 s",
-         args.optics.white_luminance_cd_m2);
   add_choice<Quantisation>(
       app, "--quantise", {{"round", Quantisation::round}, {"floor", Quantisation::floor}},
       [&f](Quantisation q) { f.quantisation = q; }, "how the converter rounds to codes")
-      ->group("Sensor figures");
+      ->group(group);
 }
 
 void add_camera(CLI::App& app, SimulateArgs& args) {
@@ -284,7 +267,7 @@ Parsed<SimulateArgs> parse_simulate(const std::vector<std::string>& words) {
            [&tolerance](const std::string& text) { return set_tolerance(text, tolerance.emplace()); });
   add_burst(app, args.burst);
   add_figures(app, args);
-  if (const auto code = parse_words(app, words)) return *code;
+  if (const auto code = parse_arguments(app, words)) return *code;
   if (tolerance) {
     if (!args.options.effects.tolerance) return refuse(app, "--tolerance: it is for --effects auto, not for a list");
     args.options.effects.tolerance = tolerance;

@@ -62,7 +62,7 @@ std::string wrong_files(const SimulateArgs& args) {
   return {};
 }
 
-Result<void> check_free(const SimulateFiles& files, const SimulateArgs& args) {
+Result<void> check_output_is_free(const SimulateFiles& files, const SimulateArgs& args) {
   std::vector<std::string> all = files.frames;
   for (const std::string& truth : {files.truth, files.truth_electrons, files.burst_truth}) {
     if (!truth.empty()) all.push_back(truth);
@@ -73,7 +73,7 @@ Result<void> check_free(const SimulateFiles& files, const SimulateArgs& args) {
     if (fs::equivalent(file, args.scene.what, ignored)) {
       return fail(ErrorCode::exists, fmt::format("{} would replace the scene", file), file);
     }
-    if (auto place = check_place(file, args.force); !place) return place;
+    if (auto place = check_output_path(file, args.force); !place) return place;
   }
   return {};
 }

@@ -27,6 +27,6 @@ std::string wrong_files(const SimulateArgs& args);
 
 /// Checks before any work that no output exists. A run that fails later (a full disk) or is interrupted leaves the
 /// frames that were finished, each of them complete.
-Result<void> check_free(const SimulateFiles& files, const SimulateArgs& args);
+Result<void> check_output_is_free(const SimulateFiles& files, const SimulateArgs& args);
 
 }  // namespace lowlux::cli

@@ -88,7 +88,7 @@ class Simulation {
         executor_(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8)) {}
 
   Result<SimulateOutcome> run() {
-    if (const auto free = check_free(files_, args_); !free) return tl::make_unexpected(free.error());
+    if (const auto free = check_output_is_free(files_, args_); !free) return tl::make_unexpected(free.error());
     isp::StageClock clock(out_.times);
     auto sensor = isp::sensor_named(args_.sensor, args_.gain, args_.figures);
     if (!sensor) return tl::make_unexpected(sensor.error());

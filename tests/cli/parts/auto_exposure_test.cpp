@@ -37,7 +37,7 @@ class NightCamera final : public capture::Camera {
   const std::vector<std::string>& warnings() const override { return warnings_; }
   Result<void> start() override { return {}; }
   void stop() override {}
-  void give_back(const capture::CameraFrame& /*frame*/) override {}
+  void return_buffer(const capture::CameraFrame& /*frame*/) override {}
   Result<capture::ExposureControls> take_exposure() override {
     return error ? Result<capture::ExposureControls>(tl::make_unexpected(*error)) : controls;
   }

@@ -56,13 +56,13 @@ TEST(MemoryGate, AsManyFilesAsMemoryHoldsAndAlwaysOne) {
 
 TEST(MemoryGate, StatesHowManyFilesShareTheProcessors) {
   MemoryGate gate(3.9e6);
-  EXPECT_EQ(gate.files_at_a_time(8), 1) << "the others wait for the first size";
+  EXPECT_EQ(gate.parallel_files(8), 1) << "the others wait for the first size";
   gate.enter();
   gate.report_size(1'200'000);
-  EXPECT_EQ(gate.files_at_a_time(8), 3);
-  EXPECT_EQ(gate.files_at_a_time(2), 2);
+  EXPECT_EQ(gate.parallel_files(8), 3);
+  EXPECT_EQ(gate.parallel_files(2), 2);
   gate.report_size(5'000'000);
-  EXPECT_EQ(gate.files_at_a_time(8), 1);
+  EXPECT_EQ(gate.parallel_files(8), 1);
   gate.leave();
 }
 

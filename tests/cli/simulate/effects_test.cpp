@@ -96,7 +96,7 @@ TEST_F(EffectsCommand, FitABudgetThatIsToldWithThePrediction) {
 }
 
 // Also of what is left out; another machine's times are not believed.
-TEST_F(EffectsCommand, TellWhatTheyTakeWithoutABudget) {
+TEST_F(EffectsCommand, StateTheirTimeWithoutABudget) {
   const Json strict = effects_of({"--tolerance", "0.01"}), loose = effects_of({"--tolerance", "90"});
   EXPECT_TRUE(strict["pace"].is_null());
   EXPECT_GT(strict["predicted_s"].get<double>(), loose["predicted_s"].get<double>());

@@ -17,7 +17,7 @@ using test::lowlux;
 using Words = std::vector<std::string>;
 
 /// What is wrong with a command line, and what its one line on stderr holds.
-struct Wrong {
+struct ArgumentError {
   Words options;
   std::string clue;
 };
@@ -36,8 +36,8 @@ class SimulateInput : public test::SimulateCommand {
     EXPECT_EQ(result.out, "") << said;
     EXPECT_EQ(scratch_.names(), before) << said;
   }
-  void expect_usage(const std::vector<Wrong>& all, const std::string& scene = "flat") {
-    for (const Wrong& wrong : all) expect_refused(scene, wrong.options, 2, wrong.clue);
+  void expect_usage(const std::vector<ArgumentError>& all, const std::string& scene = "flat") {
+    for (const ArgumentError& wrong : all) expect_refused(scene, wrong.options, 2, wrong.clue);
   }
 
   // A table of spectra as the file NAME.csv.
