@@ -38,8 +38,8 @@ struct Run {
   int rows;
   int levels;
   std::array<double, 3> dark_e;     // R, G, B
-  float most_ratio;                 // of the noise
-  double offset_e = 0;              // of the stabiliser
+  float max_ratio;                  // largest noise ratio
+  double offset_e = 0;              // offset of the stabiliser
   PlaneView<std::uint8_t> sources;  // no data: no search for point sources
 
   Run(FrameMemory& m, const RawElectronsView& r, const RawNoise& n, const DenoiseOptions& o, Executor& executor)
@@ -51,10 +51,10 @@ struct Run {
         columns((r.value.width + 1) / 2),
         rows((r.value.height + 1) / 2),
         levels(levels_of(columns, rows)),
-        most_ratio(r.noise_ratio.largest()) {
+        max_ratio(r.noise_ratio.largest()) {
     const PerSite<int> site = sites_of(r.phase);
     dark_e = {n.dark_mean_e[site[0]], (n.dark_mean_e[site[1]] + n.dark_mean_e[site[2]]) / 2, n.dark_mean_e[site[3]]};
-    offset_e = stabilising_offset(dark_e, noise, static_cast<double>(most_ratio), options);
+    offset_e = stabilising_offset(dark_e, noise, static_cast<double>(max_ratio), options);
     const int width = padded(columns, levels), height = padded(rows, levels);
     for (int l = 0; l < levels; ++l) {
       m.level[l].width = width >> l;
@@ -202,7 +202,7 @@ void Run::front() const {
       if (!raw.noise_ratio.is_one()) {
         ratio_of_squares(raw.noise_ratio, columns, rows, pair, {m.ratio, static_cast<std::size_t>(level.width / 2)});
         in.ratio = m.ratio;
-        in.most_ratio = most_ratio;
+        in.max_ratio = max_ratio;
         for (int p = 0; p < 3; ++p) {
           for (int i = 0; i < 2; ++i) in.plane[p][i] = level.noisy.row(p, 2 * pair + i);
         }
@@ -222,7 +222,7 @@ std::span<const float> Run::removed(const PlaneSet& planes) const {
   for (std::size_t i = 0; i < out.size(); ++i) {
     const TileOfSites at = sites_of_tile(static_cast<int>(i) % across, static_cast<int>(i) / across);
     const double ratio = raw.noise_ratio.mean(at.left, at.top, at.right - at.left, at.bottom - at.top);
-    const double missing = static_cast<double>(most_ratio) - (1 - static_cast<double>(out[i])) * ratio;
+    const double missing = static_cast<double>(max_ratio) - (1 - static_cast<double>(out[i])) * ratio;
     out[i] = static_cast<float>(options.variance_scale[0] * missing);
   }
   return out;
@@ -319,8 +319,8 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
       }
       in.red_is_odd = red_column(raw.phase) == 1;
       const LumaRows luma = luma_rows(planes, y, rows);
-      in.luma_beside[0] = luma.above;
-      in.luma_beside[1] = luma.below;
+      in.neighbour_luma[0] = luma.above;
+      in.neighbour_luma[1] = luma.below;
       in.slopes = {slopes.c2_x, slopes.c2_y, slopes.c3_x, slopes.c3_y};
       rows::unpack_row(
           in, {{m.signal[0], m.signal[1]}, m.confidence, m.residual[0], {m.residual[1], m.residual[2], m.residual[3]}});
@@ -397,7 +397,7 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   const PassFrame frame{state_->memory, starts, run.levels, run.workers, options.variance_scale};
   run.front();
   if (!options.sites_coincide) {
-    take_slopes_off(state_->memory.level[0], raw.phase, run.columns, run.rows, run.workers);
+    subtract_slopes(state_->memory.level[0], raw.phase, run.columns, run.rows, run.workers);
   }
   fill_saturated_chroma(state_->memory, run.levels, run.workers);
   build_pyramid(frame);

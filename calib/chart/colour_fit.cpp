@@ -156,12 +156,12 @@ Eigen::VectorXd residuals(const Unknowns& unknowns, const Eigen::VectorXd& theta
 /// result is never worse than the start.
 Eigen::VectorXd minimise_ciede2000(const Unknowns& unknowns, Eigen::VectorXd theta,
                                    std::span<const ColourSample> samples, const isp::Xyz& white) {
-  constexpr int most_steps = 60;
+  constexpr int max_steps = 60;
   constexpr double relative_step = 1e-6, settled = 1e-9;
   Eigen::VectorXd residual = residuals(unknowns, theta, samples, white);
   double damping = 1e-3;
   const double scale = theta.head(static_cast<Eigen::Index>(unknowns.basis.size())).cwiseAbs().maxCoeff();
-  for (int step = 0; step < most_steps && damping < 1e12; ++step) {
+  for (int step = 0; step < max_steps && damping < 1e12; ++step) {
     Eigen::MatrixXd slope(residual.size(), theta.size());
     for (Eigen::Index k = 0; k < theta.size(); ++k) {
       const bool of_light = k >= static_cast<Eigen::Index>(unknowns.basis.size());

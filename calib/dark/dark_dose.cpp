@@ -183,8 +183,8 @@ std::optional<double> fitted_doubling_c(std::span<const DarkLevel> levels, std::
   return best;
 }
 
-Result<DarkWeights> weigh_darks(std::span<const DarkLevel> levels, const DarkExposure& picture,
-                                const DarkScaling& known) {
+Result<DarkWeights> compute_dark_weights(std::span<const DarkLevel> levels, const DarkExposure& picture,
+                                         const DarkScaling& known) {
   if (levels.empty()) return fail(ErrorCode::insufficient, "there are no dark frames");
   auto out = plain_mean(levels, picture);
   if (!out) {

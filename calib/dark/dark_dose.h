@@ -51,8 +51,8 @@ struct DarkWeights {
 /// fitted to the levels, if they determine it. Errors: no darks; a pedestal or doubling that is needed and not known;
 /// more than 4 times the charge of the darks. Warnings: charge or temperature beyond the darks'; a temperature that is
 /// not stated.
-Result<DarkWeights> weigh_darks(std::span<const DarkLevel> levels, const DarkExposure& picture,
-                                const DarkScaling& known);
+Result<DarkWeights> compute_dark_weights(std::span<const DarkLevel> levels, const DarkExposure& picture,
+                                         const DarkScaling& known);
 
 /// Returns the degrees over which the dark charge of the levels doubles, 2 to 30, by least squares with pedestal
 /// (fitted too, if none is known) and current. nullopt unless both ends of that range lie five standard deviations off.

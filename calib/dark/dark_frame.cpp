@@ -22,7 +22,7 @@ constexpr double near_white = 0.05;  // of the range
 constexpr double level_cut = 5;      // standard deviations
 constexpr double max_noise = 5;      // relative to the noise of a pixel's site
 constexpr double max_unknown = 1.0 / 16;
-constexpr double clipped_share = 1e-3;
+constexpr double clipped_fraction = 1e-3;
 constexpr double min_doubling_c = 2, max_doubling_c = 30;
 
 /// Inputs and intermediate results, before pixels are processed.
@@ -145,7 +145,7 @@ Result<Job> weigh(Groups groups, const FrameSetting& picture, const DarkRequest&
       .doubling_c = request.doubling_c,
       .pedestal_dn = request.pedestal_dn ? std::optional(mean_of_sites(*request.pedestal_dn)) : std::nullopt,
       .pedestal_from_picture = request.masked_dn.has_value()};
-  auto weights = weigh_darks(levels_of(job), {*picture.exposure_s, picture.temperature_c}, known);
+  auto weights = compute_dark_weights(levels_of(job), {*picture.exposure_s, picture.temperature_c}, known);
   if (!weights) return tl::make_unexpected(weights.error());
   job.weights = std::move(*weights);
   if (job.weights.of_pedestal != 0 && request.masked_dn) {
@@ -263,7 +263,7 @@ void describe(const Job& job, bool estimated, DarkFrame& out) {
     out.estimated = out.estimated || (estimated && job.per_file[g] > 1);
     ++out.settings;
     const double zero = *std::ranges::max_element(job.groups[g].fraction_at_zero);
-    if (zero > clipped_share) {
+    if (zero > clipped_fraction) {
       out.warnings.push_back(
           fmt::format("{:.2g} % of the darks' samples are cut off at code 0: their mean is too high", 100 * zero));
     }

@@ -46,7 +46,7 @@ std::vector<DarkGroup> DarkLibrary::groups() const {
 
 namespace {
 
-constexpr std::size_t most_gains = 16, max_settings = 32;
+constexpr std::size_t max_gains = 16, max_settings = 32;
 
 auto order_of(const DarkGroup& g) {
   return std::tuple(g.setting.temperature_c.value_or(0), g.setting.exposure_s.value_or(0));
@@ -65,10 +65,10 @@ Result<void> DarkSorter::add(const RawDn& frame) {
   const auto found =
       std::find_if(gains_.begin(), gains_.end(), [&](const Gain& g) { return g.first.iso == setting->iso; });
   if (found != gains_.end()) return found->darks.add(frame);
-  if (gains_.size() == most_gains) {
+  if (gains_.size() == max_gains) {
     return fail(
         ErrorCode::too_large,
-        fmt::format("the darks have more than {} gain settings; calibrate them in parts with --add-to", most_gains));
+        fmt::format("the darks have more than {} gain settings; calibrate them in parts with --add-to", max_gains));
   }
   Gain added{std::move(*setting), DarkLibrary(max_settings)};
   if (auto stacked = added.darks.add(frame); !stacked) return stacked;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double hot_deviations = 8;
 constexpr double max_excluded = 0.05;
-constexpr double clipped_share = 1e-3;
+constexpr double clipped_fraction = 1e-3;
 constexpr double min_misfit = 0.02;   // of the dark charge: smallest deviation that counts as nonlinear
 constexpr double min_gradient = 0.1;  // of the dark charge, from edge to edge
 constexpr double certain = 5;         // standard errors
@@ -41,7 +41,7 @@ Result<void> check_groups(Groups groups) {
                   "some darks state their temperature and some do not; use frames of one kind");
     }
     const double zero = *std::max_element(groups[g].fraction_at_zero.begin(), groups[g].fraction_at_zero.end());
-    if (zero > clipped_share) {
+    if (zero > clipped_fraction) {
       return fail(
           ErrorCode::insufficient,
           fmt::format("{:.2g} % of the samples of {} are at code 0, so their mean is too high; raise the camera's "

@@ -12,11 +12,11 @@
 namespace lowlux::calib {
 namespace {
 
-constexpr double linear_fraction = 0.7;  // of saturation: EMVA 1288, section 6.6
-constexpr double largest_drift = 0.01;   // of the signal
-constexpr double clipped_share = 1e-3;   // clipping 0.1 % of a normal distribution reduces its variance by 0.7 %
-constexpr double fallen_variance = 0.8;  // of the largest: more than a variance from 1000 pixels scatters
-constexpr double same_level = 1.05;      // ratio of signals below which two pairs are one level
+constexpr double linear_fraction = 0.7;    // of saturation: EMVA 1288, section 6.6
+constexpr double largest_drift = 0.01;     // of the signal
+constexpr double clipped_fraction = 1e-3;  // clipping 0.1 % of a normal distribution reduces its variance by 0.7 %
+constexpr double fallen_variance = 0.8;    // of the largest: more than a variance from 1000 pixels scatters
+constexpr double same_level = 1.05;        // ratio of signals below which two pairs are one level
 constexpr int fewest_levels = 4;
 constexpr int fewest_pixels = 1000;  // of a site: variances then scatter by 4.5 %
 constexpr double dithered_variance_dn2 = 0.25;
@@ -39,7 +39,7 @@ Result<void> check_darks(Pairs darks) {
                                 "part of the frame",
                                 s.pixels, fewest_pixels));
       }
-      if (s.fraction_at_zero <= clipped_share) continue;
+      if (s.fraction_at_zero <= clipped_fraction) continue;
       return fail(ErrorCode::insufficient,
                   fmt::format("{:.2g} % of the samples of {} are at code 0, so their noise is cut off; raise the "
                               "camera's black level (offset)",
@@ -97,7 +97,7 @@ TransferPeak peak_of(const Points& flats, Pairs pairs, int site) {
     brightest = std::max(brightest, p.signal_dn);
     const bool fallen = p.signal_dn > peak.signal_dn && p.variance_dn2 < fallen_variance * largest;
     if (fallen) fallen_dn = std::min(fallen_dn, p.signal_dn);
-    peak.reached |= fallen || pairs[p.pair].site[site].fraction_at_white > clipped_share;
+    peak.reached |= fallen || pairs[p.pair].site[site].fraction_at_white > clipped_fraction;
   }
   if (!peak.reached) peak.signal_dn = brightest;
   peak.fallen_dn = std::min(fallen_dn, brightest);

@@ -170,7 +170,7 @@ FlatPoints flat_points(const NoiseSamples& samples, const NoiseLine& line, const
       }
       if (sum.high_n * samples.details.high < min_degrees / 2) return;
       const NoisePoint point = point_of(sum, samples.details, clip[site], limit.mean_below);
-      if (clipped_share(line, point.mean_dn, clip[site]) > max_clipped) return;
+      if (clipped_fraction(line, point.mean_dn, clip[site]) > max_clipped) return;
       out.points.push_back(point);
     });
   }
@@ -209,7 +209,7 @@ double quiet_ratio(const NoiseSamples& samples, const NoiseLine& line, const Per
     for_each_group(of, groups_for(of.size(), samples.details.high), [&](std::span<const NoiseSample> group) {
       const Sum sum = quietest_of(group, share, memory);
       const double mean_dn = sum.mean / sum.n;
-      if (clipped_share(line, mean_dn, clip[site]) > max_clipped) return;
+      if (clipped_fraction(line, mean_dn, clip[site]) > max_clipped) return;
       const double model = read_variance_dn2(line, mean_dn, clip[site]);
       if (model > 0) ratio.push_back(sum.high / sum.high_n / model);
     });
@@ -224,7 +224,7 @@ namespace {
 
 constexpr int windows = 16;
 constexpr double dense_per_code = 30;
-constexpr int least_width = 8;              // codes of a window: in fewer, steps cannot be measured
+constexpr int min_width = 8;                // codes of a window: in fewer, steps cannot be measured
 constexpr std::int64_t filled_count = 16;   // pixels: a code between two of this many is unused by chance in exp(-16)
 constexpr std::size_t min_gaps = 4;         // of a window
 constexpr double quietest_fraction = 0.05;  // of each group of samples
@@ -288,7 +288,7 @@ Steps steps_of(const std::vector<std::int64_t>& count) {
     const int first = low + (high - low) * w / windows, last = low + (high - low) * (w + 1) / windows;
     std::int64_t pixels = 0;
     for (int code = first; code < last; ++code) pixels += count[code];
-    if (last - first < least_width || static_cast<double>(pixels) < dense_per_code * (last - first)) continue;
+    if (last - first < min_width || static_cast<double>(pixels) < dense_per_code * (last - first)) continue;
     std::vector<int> gaps = gaps_of(count, first, last);
     if (gaps.size() < min_gaps) continue;
     const int step = static_cast<int>(std::lround(mean_gap(std::move(gaps))));

@@ -223,7 +223,7 @@ double read_variance_dn2(const NoiseLine& line, double mean_dn, const ClipRange&
   return read_moments(line, {law.mean, dithered}, clip).variance + kept * std::min(quantisation_dn2, law.variance);
 }
 
-double clipped_share(const NoiseLine& line, double mean_dn, const ClipRange& clip) {
+double clipped_fraction(const NoiseLine& line, double mean_dn, const ClipRange& clip) {
   return fraction_beyond(law_seen_as(line, mean_dn, clip), clip);
 }
 

@@ -38,7 +38,7 @@ struct NoiseLine {
 double read_variance_dn2(const NoiseLine& line, double mean_dn, const ClipRange& clip);
 
 /// Returns the fraction of pixels whose clipped mean is `mean_dn` that is clipped, according to the line.
-double clipped_share(const NoiseLine& line, double mean_dn, const ClipRange& clip);
+double clipped_fraction(const NoiseLine& line, double mean_dn, const ClipRange& clip);
 
 /// Holds the prior of a line: before any point is measured, gain and offset are distributed log-normally about these
 /// values, independent of each other.

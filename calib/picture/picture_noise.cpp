@@ -16,10 +16,10 @@ namespace {
 constexpr std::size_t min_samples = 100;
 constexpr double first_fraction = 0.05;  // of each group: the samples of least detail, as a start
 constexpr int max_rounds = 30;
-constexpr double settled = 1e-3;             // relative change of the gain
-constexpr double expected_contrast = 0.015;  // of PRNU, grain and texture as fine as pixels, in flat samples
-constexpr double most_clipped_share = 0.9;   // of the pixels
-constexpr double largest_gain_error = 0.15;  // relative: beyond, the levels were too similar
+constexpr double settled = 1e-3;              // relative change of the gain
+constexpr double expected_contrast = 0.015;   // of PRNU, grain and texture as fine as pixels, in flat samples
+constexpr double max_clipped_fraction = 0.9;  // of the pixels
+constexpr double largest_gain_error = 0.15;   // relative: beyond, the levels were too similar
 constexpr double largest_chi_square = 5;
 constexpr double min_prior_ratio = 0.7;  // of the variance of the quietest samples to the line's: below, it is scaled
 constexpr double least_prior_ratio = 1e-3;
@@ -179,7 +179,7 @@ Result<PerSite<ClipRange>> clip_ranges(const RawDn& raw, const PerSite<double>& 
     pixels += range.pixels;
   }
   join_greens(raw, clip);
-  if (clipped > most_clipped_share * pixels) {
+  if (clipped > max_clipped_fraction * pixels) {
     return fail(ErrorCode::insufficient,
                 fmt::format("{:.0f} % of the pixels are clipped: change the exposure", 100 * clipped / pixels));
   }

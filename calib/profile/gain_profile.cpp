@@ -255,7 +255,7 @@ namespace {
 
 constexpr double cut_deviations = 5;
 constexpr double max_excluded = 0.05;
-constexpr double clipped_share = 1e-3;
+constexpr double clipped_fraction = 1e-3;
 constexpr double fewest_pixels = 500;  // of a site: the standard error is below 0.05 standard deviations
 
 int lines_of(int pixels, int parity) { return (pixels + 1 - parity) / 2; }
@@ -279,7 +279,7 @@ void exclude(const Plane<float>& mean_dn, int site, int frames, double gain_dn_p
 
 Result<void> check_codes(const DarkGroup& group) {
   for (int site = 0; site < 4; ++site) {
-    if (group.fraction_at_zero[site] <= clipped_share) continue;
+    if (group.fraction_at_zero[site] <= clipped_fraction) continue;
     return fail(ErrorCode::insufficient,
                 fmt::format("{:.2g} % of the dark samples are at code 0, so their mean is too high; raise the camera's "
                             "black level (offset)",

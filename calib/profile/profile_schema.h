@@ -34,7 +34,7 @@ bool check_range(double value, const Range& range, const std::string& path, Prof
 void check_together(const CameraProfile& profile, ProfileFailure& failure);
 
 inline constexpr double tiny = 1e-12;  // stands for "above 0"
-inline constexpr std::size_t most_gains = 256, max_hot_pixels = 100000, max_files = 10000, max_provenance = 64,
+inline constexpr std::size_t max_gains = 256, max_hot_pixels = 100000, max_files = 10000, max_provenance = 64,
                              max_colours = 64;
 inline constexpr Range matrix_entries{-1e3, 1e3};
 
@@ -137,7 +137,7 @@ void visit_profile(Visitor& v, Profile& p) {
   v.text("make", p.make);
   v.text("model", p.model);
   v.text("mosaic", p.mosaic);
-  v.list("gains", p.gains, most_gains, [](Visitor& inner, auto& gain) { visit_gain(inner, gain); });
+  v.list("gains", p.gains, max_gains, [](Visitor& inner, auto& gain) { visit_gain(inner, gain); });
   v.list("colours", p.colours, max_colours, [](Visitor& inner, auto& colour) { visit_colour(inner, colour); });
 }
 

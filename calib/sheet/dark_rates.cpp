@@ -198,7 +198,7 @@ Estimate over_gain(const Estimate& slope, const Estimate& gain, int power) {
 }
 
 DarkRate rate_of(std::span<const DarkGroup* const> groups, const Estimate& gain) {
-  constexpr double least_error_dn = 1e-9;  // frames without any noise
+  constexpr double min_error_dn = 1e-9;  // frames without any noise
   std::vector<double> time_s;
   std::vector<Estimate> mean_dn, variance_dn2;
   for (const DarkGroup* group : groups) {
@@ -210,7 +210,7 @@ DarkRate rate_of(std::span<const DarkGroup* const> groups, const Estimate& gain)
     variance_dn2.back().standard_error =
         std::hypot(variance_dn2.back().standard_error, row_variance * std::sqrt(2 / (rows * (frames - 1))));
     for (Estimate* e : {&mean_dn.back(), &variance_dn2.back()}) {
-      e->standard_error = std::max(e->standard_error, least_error_dn);
+      e->standard_error = std::max(e->standard_error, min_error_dn);
     }
   }
   return {groups.front()->setting.temperature_c, over_gain(slope_of(time_s, mean_dn), gain, 1),

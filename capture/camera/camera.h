@@ -101,7 +101,7 @@ class Camera {
   /// Waits for the next frame. Errors: no frame in time (insufficient), the device was removed (not_found), the device
   /// failed (unreadable). After not_found all later calls fail.
   virtual Result<CameraFrame> next(std::chrono::milliseconds timeout) = 0;
-  virtual void give_back(const CameraFrame& frame) = 0;
+  virtual void return_buffer(const CameraFrame& frame) = 0;
   /// Ends streaming, within two seconds; frames that were not given back become invalid. start() starts it again.
   virtual void stop() = 0;
 

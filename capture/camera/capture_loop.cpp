@@ -47,7 +47,7 @@ class Loop {
       if (!frame) return tl::make_unexpected(frame.error());
       if (*frame) {
         const Result<bool> more = take(**frame, check, work);
-        camera_.give_back(**frame);
+        camera_.return_buffer(**frame);
         if (!more) return tl::make_unexpected(more.error());
         wanted = *more;
       }
@@ -76,10 +76,10 @@ class Loop {
     }
     if (frame.error().code != ErrorCode::insufficient) return tl::make_unexpected(frame.error());
     if (now - last_whole_ < limits_.timeout) return std::nullopt;
-    return tl::make_unexpected(none_in_time(frame.error()));
+    return tl::make_unexpected(frame_timeout_error(frame.error()));
   }
 
-  Error none_in_time(const Error& last) const {
+  Error frame_timeout_error(const Error& last) const {
     const std::string limit_s = number_text(std::chrono::duration<double>(limits_.timeout).count());
     std::string text = count_.damaged > 0 ? "no whole frame" : "no frame";
     text += " came within " + limit_s + " s: " + last.message;
@@ -92,7 +92,7 @@ class Loop {
       const bool late = steady_clock::now() - last_whole_ >= limits_.timeout;
       if (!late) return true;
       return tl::make_unexpected(
-          none_in_time({ErrorCode::insufficient, "the device reports that its frames are damaged", {}}));
+          frame_timeout_error({ErrorCode::insufficient, "the device reports that its frames are damaged", {}}));
     }
     Result<bool> good = check ? check(frame) : Result<bool>(true);
     if (!good) return good;

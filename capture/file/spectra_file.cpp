@@ -14,9 +14,9 @@
 namespace lowlux::capture {
 namespace {
 
-constexpr std::size_t most_bytes = 16 << 20;
+constexpr std::size_t max_bytes = 16 << 20;
 constexpr std::size_t max_columns = 4096;
-constexpr std::size_t most_rows = 100000;
+constexpr std::size_t max_rows = 100000;
 
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t\r");
@@ -55,7 +55,7 @@ class Table {
     if (cells.size() != names_.size()) {
       return wrong("has " + std::to_string(cells.size()) + " cells, the row of names " + std::to_string(names_.size()));
     }
-    if (columns_.front().size() == most_rows) return wrong("is one row too many: at most " + std::to_string(most_rows));
+    if (columns_.front().size() == max_rows) return wrong("is one row too many: at most " + std::to_string(max_rows));
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const std::optional<double> value = finite_number_of(cells[i]);
       if (!value) {
@@ -105,7 +105,7 @@ class Table {
 }  // namespace
 
 Result<std::vector<SpectrumColumn>> parse_spectra(const std::string& text, const std::string& name) {
-  if (text.size() > most_bytes) return fail(ErrorCode::too_large, "a table of spectra has at most 16 MB", name);
+  if (text.size() > max_bytes) return fail(ErrorCode::too_large, "a table of spectra has at most 16 MB", name);
   Table table(name);
   for (std::size_t start = 0; start < text.size();) {
     const std::size_t end = std::min(text.find('\n', start), text.size());
@@ -118,7 +118,7 @@ Result<std::vector<SpectrumColumn>> parse_spectra(const std::string& text, const
 }
 
 Result<std::vector<SpectrumColumn>> read_spectra(const std::string& path) {
-  const auto bytes = read_file_bytes(path, most_bytes);
+  const auto bytes = read_file_bytes(path, max_bytes);
   if (!bytes) return tl::make_unexpected(bytes.error());
   return parse_spectra(std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size()), path);
 }

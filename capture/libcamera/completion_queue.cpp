@@ -11,13 +11,13 @@ void CompletionQueue::push(const Completion& completion) noexcept {
   changed_.notify_all();
 }
 
-void CompletionQueue::set_gone() noexcept {
+void CompletionQueue::set_disconnected() noexcept {
   const std::lock_guard lock(mutex_);
   gone_ = true;
   changed_.notify_all();
 }
 
-bool CompletionQueue::is_gone() const {
+bool CompletionQueue::is_disconnected() const {
   const std::lock_guard lock(mutex_);
   return gone_;
 }
@@ -31,7 +31,7 @@ std::optional<Completion> CompletionQueue::take(Time deadline) {
   return oldest;
 }
 
-bool CompletionQueue::wait_gone(Time deadline) {
+bool CompletionQueue::wait_disconnected(Time deadline) {
   std::unique_lock lock(mutex_);
   return changed_.wait_until(lock, deadline, [&] { return gone_; });
 }

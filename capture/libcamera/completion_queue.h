@@ -42,14 +42,14 @@ class CompletionQueue {
   /// Adds a completion, on the camera's thread. It is dropped if the queue is full: no buffer comes back twice.
   void push(const Completion& completion) noexcept;
   /// Records, on the camera's thread, that the camera was unplugged, permanently.
-  void set_gone() noexcept;
-  bool is_gone() const;
+  void set_disconnected() noexcept;
+  bool is_disconnected() const;
 
   /// Returns the oldest completion; waits for one until the deadline. nullopt: none came, or the camera is gone and
   /// left none.
   std::optional<Completion> take(Time deadline);
   /// Returns whether the camera is gone; waits for it until the deadline.
-  bool wait_gone(Time deadline);
+  bool wait_disconnected(Time deadline);
   void clear();
 
  private:

@@ -270,6 +270,6 @@ void LibcameraDevice::request_completed(libcamera::Request* request) {
   completions_->push(completion);
 }
 
-void LibcameraDevice::disconnected() { completions_->set_gone(); }
+void LibcameraDevice::disconnected() { completions_->set_disconnected(); }
 
 }  // namespace lowlux::capture

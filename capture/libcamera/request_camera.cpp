@@ -39,7 +39,7 @@ RequestCamera::~RequestCamera() { stop(); }
 
 Error RequestCamera::gone() const { return device_error(-ENODEV, "read from", open_.name); }
 
-Error RequestCamera::none_in_time(milliseconds timeout) const {
+Error RequestCamera::frame_timeout_error(milliseconds timeout) const {
   const auto lent = std::count_if(lent_.begin(), lent_.end(), [](const auto& stamp) { return stamp.has_value(); });
   const std::string held =
       lent == open_.buffers ? ": all " + std::to_string(lent) + " buffers are lent, give one back" : "";
@@ -48,13 +48,13 @@ Error RequestCamera::none_in_time(milliseconds timeout) const {
 }
 
 Error RequestCamera::cancelled() {
-  if (open_.completions->wait_gone(std::chrono::steady_clock::now() + patience_after_cancel)) return gone();
-  return {ErrorCode::unreadable, "the camera ended the stream by itself: start it anew", open_.name};
+  if (open_.completions->wait_disconnected(std::chrono::steady_clock::now() + patience_after_cancel)) return gone();
+  return {ErrorCode::unreadable, "the camera ended the stream: start it again", open_.name};
 }
 
 Result<void> RequestCamera::start() {
   if (streaming_) return {};
-  if (open_.completions->is_gone()) return tl::make_unexpected(gone());
+  if (open_.completions->is_disconnected()) return tl::make_unexpected(gone());
   open_.completions->clear();
   last_sequence_.reset();
   failed_ = 0;
@@ -72,7 +72,7 @@ Result<void> RequestCamera::start() {
 void RequestCamera::queue(int buffer) {
   const int result = open_.device->queue(buffer);
   if (result < 0) failed_ = result;
-  if (result == -ENODEV) open_.completions->set_gone();
+  if (result == -ENODEV) open_.completions->set_disconnected();
 }
 
 Result<CameraFrame> RequestCamera::next(milliseconds timeout) {
@@ -82,15 +82,15 @@ Result<CameraFrame> RequestCamera::next(milliseconds timeout) {
   for (;;) {
     const auto completion = open_.completions->take(deadline);
     if (!completion) {
-      if (open_.completions->is_gone()) return tl::make_unexpected(gone());
+      if (open_.completions->is_disconnected()) return tl::make_unexpected(gone());
       if (failed_ != 0) return tl::make_unexpected(device_error(failed_, "give a buffer to", open_.name));
-      return tl::make_unexpected(none_in_time(wait));
+      return tl::make_unexpected(frame_timeout_error(wait));
     }
     if (completion->state == CompletionState::cancelled) return tl::make_unexpected(cancelled());
     if (completion->state != CompletionState::startup) return lend(*completion);
     last_sequence_ = completion->sequence;
     queue(completion->buffer);
-    if (std::chrono::steady_clock::now() >= deadline) return tl::make_unexpected(none_in_time(wait));
+    if (std::chrono::steady_clock::now() >= deadline) return tl::make_unexpected(frame_timeout_error(wait));
   }
 }
 
@@ -114,7 +114,7 @@ CameraFrame RequestCamera::lend(const Completion& completion) {
           .buffer = completion.buffer};
 }
 
-void RequestCamera::give_back(const CameraFrame& frame) {
+void RequestCamera::return_buffer(const CameraFrame& frame) {
   if (frame.buffer < 0 || frame.buffer >= open_.buffers) return;
   auto& lent = lent_[static_cast<std::size_t>(frame.buffer)];
   if (lent != frame.timestamp) return;  // of a stream that has ended, or given back twice
@@ -142,7 +142,7 @@ Result<ExposureControls> RequestCamera::take_exposure() {
 }
 
 Result<double> RequestCamera::set_exposure(const CameraExposure& exposure) {
-  if (open_.completions->is_gone()) return tl::make_unexpected(gone());
+  if (open_.completions->is_disconnected()) return tl::make_unexpected(gone());
   open_.device->set_exposure(exposure);
   return exposure.exposure_s;
 }

@@ -55,14 +55,14 @@ class RequestCamera final : public Camera {
   const std::vector<std::string>& warnings() const override { return open_.warnings; }
   Result<void> start() override;
   Result<CameraFrame> next(std::chrono::milliseconds timeout) override;
-  void give_back(const CameraFrame& frame) override;
+  void return_buffer(const CameraFrame& frame) override;
   void stop() override;
   Result<ExposureControls> take_exposure() override;
   Result<double> set_exposure(const CameraExposure& exposure) override;
 
  private:
   Error gone() const;
-  Error none_in_time(std::chrono::milliseconds timeout) const;
+  Error frame_timeout_error(std::chrono::milliseconds timeout) const;
   Error cancelled();
   void queue(int buffer);
   CameraFrame lend(const Completion& completion);

@@ -88,9 +88,9 @@ Result<ExposureControls> exposure_controls(const CameraRequest& request, const O
   out.max_s = std::max(std::floor(time.range->largest) * 1e-6, out.min_s);
   const auto& gain = offered.analogue_gain;
   if (request.analogue_gain || !gain.offered || !gain.range || !(gain.range->largest >= gain.range->least)) return out;
-  constexpr int steps_for_each_ev = 16, most_steps = 16 * steps_for_each_ev;
+  constexpr int steps_for_each_ev = 16, max_steps = 16 * steps_for_each_ev;
   const double first = std::max(gain.range->least, 1e-3);
-  for (int i = 0; i <= most_steps; ++i) {
+  for (int i = 0; i <= max_steps; ++i) {
     const double factor = first * std::exp2(static_cast<double>(i) / steps_for_each_ev);
     if (i > 0 && factor > gain.range->largest) break;
     out.gains.push_back({.factor = factor, .code = 0});

@@ -86,14 +86,14 @@ Result<std::unique_ptr<V4l2Buffers>> V4l2Buffers::request(V4l2Device& device, V4
                 device.path());
   }
   out->buffers_.reserve(had);
-  const std::size_t most_bytes = max_buffer_bytes / had;
+  const std::size_t max_bytes = max_buffer_bytes / had;
   for (std::uint32_t index = 0; index < had; ++index) {
-    if (auto added = out->add(index, frame_bytes, most_bytes); !added) return pass_on(added);
+    if (auto added = out->add(index, frame_bytes, max_bytes); !added) return pass_on(added);
   }
   return out;
 }
 
-Result<void> V4l2Buffers::add(std::uint32_t index, std::size_t frame_bytes, std::size_t most_bytes) {
+Result<void> V4l2Buffers::add(std::uint32_t index, std::size_t frame_bytes, std::size_t max_bytes) {
   BufferCall told(device_, index);
   if (const int code = device_.call(VIDIOC_QUERYBUF, &told.buffer)) {
     return tl::make_unexpected(device_.error(code, "the driver does not describe its buffer"));
@@ -104,10 +104,10 @@ Result<void> V4l2Buffers::add(std::uint32_t index, std::size_t frame_bytes, std:
                     std::to_string(frame_bytes) + ": ask for another format",
                 device_.path());
   }
-  if (told.bytes() > most_bytes) {
+  if (told.bytes() > max_bytes) {
     return fail(ErrorCode::too_large,
                 "a buffer of the driver has " + std::to_string(told.bytes()) + " bytes, the limit for each is " +
-                    std::to_string(most_bytes) + ": ask for fewer buffers, or for a smaller size",
+                    std::to_string(max_bytes) + ": ask for fewer buffers, or for a smaller size",
                 device_.path());
   }
   Buffer buffer{.at = nullptr, .bytes = told.bytes(), .file = -1, .queued = false};
@@ -210,7 +210,7 @@ int V4l2Buffers::synchronise(std::size_t index, std::uint64_t flags) {
   for (int attempt = 0; attempt < max_attempts && (code == EAGAIN || code == EINTR); ++attempt) {
     code = system.ioctl(system.context, buffers_[index].file, DMA_BUF_IOCTL_SYNC, &asked) < 0 ? errno : 0;
   }
-  if (code == ENODEV) device_.set_gone();
+  if (code == ENODEV) device_.set_disconnected();
   return code;
 }
 

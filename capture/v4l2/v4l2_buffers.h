@@ -57,7 +57,7 @@ class V4l2Buffers {
     bool accessed = false;  // begin_access was called without end_access
   };
   V4l2Buffers(V4l2Device& device, V4l2Memory memory) : device_(device), memory_(memory) {}
-  Result<void> add(std::uint32_t index, std::size_t frame_bytes, std::size_t most_bytes);
+  Result<void> add(std::uint32_t index, std::size_t frame_bytes, std::size_t max_bytes);
   Result<int> exported(std::uint32_t index);
   int synchronise(std::size_t index, std::uint64_t flags);
 

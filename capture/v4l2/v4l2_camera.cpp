@@ -64,7 +64,7 @@ V4l2Camera::V4l2Camera(std::unique_ptr<V4l2Device> device, V4l2Agreement agreeme
 
 Result<void> V4l2Camera::start() {
   if (buffers_) return {};
-  if (device_->gone()) return tl::make_unexpected(device_->gone_error());
+  if (device_->gone()) return tl::make_unexpected(device_->disconnected_error());
   auto buffers =
       V4l2Buffers::request(*device_, options_.memory, options_.request.buffers, frame_bytes(agreement_.format));
   if (!buffers) return pass_on(buffers);
@@ -92,7 +92,7 @@ Result<void> V4l2Camera::check_unchanged() {
 void V4l2Camera::stop() { buffers_.reset(); }
 
 std::optional<Error> V4l2Camera::not_ready() const {
-  if (device_->gone()) return device_->gone_error();
+  if (device_->gone()) return device_->disconnected_error();
   if (failure_) return failure_;
   if (!buffers_) return Error{ErrorCode::insufficient, "the camera delivers nothing before it is started", {}};
   if (buffers_->queued() == 0) {
@@ -144,8 +144,8 @@ std::optional<Error> V4l2Camera::wait(nanoseconds until, short events, short* ha
     if (code != EINTR && code != EAGAIN) return device_->error(code, "waiting for a frame failed");
   }
   if ((*happened & POLLHUP) != 0) {
-    device_->set_gone();
-    return device_->gone_error();
+    device_->set_disconnected();
+    return device_->disconnected_error();
   }
   return std::nullopt;
 }
@@ -192,9 +192,9 @@ nanoseconds V4l2Camera::timestamp_of(const V4l2Taken& taken) {
   const bool sane =
       taken.seconds >= 0 && taken.seconds < max_seconds && taken.microseconds >= 0 && taken.microseconds < 1'000'000;
   if (monotonic && sane) return std::chrono::seconds(taken.seconds) + std::chrono::microseconds(taken.microseconds);
-  if (!told_of_clock_) {
+  if (!warned_of_clock_) {
     agreement_.warnings.emplace_back("the driver's timestamps are not of the monotonic clock: frames have none");
-    told_of_clock_ = true;
+    warned_of_clock_ = true;
   }
   return nanoseconds(0);
 }
@@ -205,7 +205,7 @@ void V4l2Camera::requeue(std::size_t index) {
   }
 }
 
-void V4l2Camera::give_back(const CameraFrame& frame) {
+void V4l2Camera::return_buffer(const CameraFrame& frame) {
   if (!buffers_ || frame.buffer < 0 || frame.buffer >> index_bits != session_) return;
   const auto index = static_cast<std::size_t>(frame.buffer & ((1 << index_bits) - 1));
   if (index >= buffers_->count() || buffers_->is_queued(index)) return;
@@ -232,7 +232,7 @@ Result<V4l2AutoExposure> V4l2AutoExposure::take(V4l2Device& device, const V4l2Op
   const bool stays = end_automatic_exposure(device);
   V4l2AutoExposure out;
   const auto time = find_exposure_time(device, format);
-  if (device.gone()) return tl::make_unexpected(device.gone_error());
+  if (device.gone()) return tl::make_unexpected(device.disconnected_error());
   if (!time || !time->control.writable) {
     return unsupported(device, "the driver has no control of the exposure time whose unit is known");
   }

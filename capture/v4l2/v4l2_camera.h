@@ -42,7 +42,7 @@ class V4l2Camera final : public Camera {
   const std::vector<std::string>& warnings() const override { return agreement_.warnings; }
   Result<void> start() override;
   Result<CameraFrame> next(std::chrono::milliseconds timeout) override;
-  void give_back(const CameraFrame& frame) override;
+  void return_buffer(const CameraFrame& frame) override;
   void stop() override;
   Result<ExposureControls> take_exposure() override;
   Result<double> set_exposure(const CameraExposure& exposure) override;
@@ -65,7 +65,7 @@ class V4l2Camera final : public Camera {
   std::optional<std::uint32_t> last_sequence_;
   std::optional<Error> failure_;  // failure that occurred where none can be returned
   int session_ = 0;               // counts the starts, to identify frames of an earlier one
-  bool told_of_clock_ = false;
+  bool warned_of_clock_ = false;
 };
 
 }  // namespace lowlux::capture

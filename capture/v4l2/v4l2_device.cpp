@@ -100,7 +100,7 @@ int V4l2Device::call(unsigned long request, void* argument) {
 Error V4l2Device::error(int code, const std::string& what) const {
   switch (code) {
     case ENODEV:
-      return gone_error();
+      return disconnected_error();
     case EBUSY:
       return {ErrorCode::unreadable, what + ": another program uses the device, end that program first", path_};
     case ENOMEM:
@@ -111,8 +111,9 @@ Error V4l2Device::error(int code, const std::string& what) const {
   }
 }
 
-Error V4l2Device::gone_error() const {
-  return {ErrorCode::not_found, "the device is gone: " + name_ + " was unplugged or its driver was unloaded", path_};
+Error V4l2Device::disconnected_error() const {
+  return {ErrorCode::not_found,
+          "the device is no longer available: " + name_ + " was unplugged or its driver was unloaded", path_};
 }
 
 namespace {

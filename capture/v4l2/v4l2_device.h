@@ -49,7 +49,7 @@ class V4l2Device {
   /// Returns the failure `code` (an errno) of the step `what`, as a message.
   Error error(int code, const std::string& what) const;
   /// Returns the error of a device that was unplugged.
-  Error gone_error() const;
+  Error disconnected_error() const;
 
   const V4l2System& system() const { return system_; }
   int file() const { return file_; }
@@ -61,7 +61,7 @@ class V4l2Device {
   /// then those of the node, whatever the sensor delivers.
   bool media_controlled() const { return media_controlled_; }
   bool gone() const { return gone_; }  // a call found that the device no longer exists
-  void set_gone() { gone_ = true; }
+  void set_disconnected() { gone_ = true; }
 
  private:
   V4l2Device(const V4l2System& system, std::string path, int file);

@@ -58,7 +58,7 @@ Result<std::uint32_t> choose_format(V4l2Device& device, const CameraRequest& req
     }
   }
   if (best != nullptr) return best->fourcc;
-  if (device.gone()) return tl::make_unexpected(device.gone_error());
+  if (device.gone()) return tl::make_unexpected(device.disconnected_error());
   const std::string lacks = request.format ? asked_text(*request.format) : "raw format that lowlux knows";
   return fail(ErrorCode::unsupported, device.name() + " has no " + lacks + ": it offers " + offers_text(device),
               device.path());

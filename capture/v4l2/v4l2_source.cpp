@@ -66,7 +66,7 @@ Result<std::unique_ptr<Camera>> open_v4l2(const std::string& device, const V4l2O
   apply_frame_rate(node, options.request, agreement->format, warnings);
   if (auto ok = apply_exposure(node, options, agreement->format, warnings); !ok) return pass_on(ok);
   // Refused settings are warnings; that the device has vanished is an error.
-  if (node.gone()) return tl::make_unexpected(node.gone_error());
+  if (node.gone()) return tl::make_unexpected(node.disconnected_error());
   agreement->warnings = std::move(warnings);
   return std::make_unique<V4l2Camera>(*std::move(opened), *std::move(agreement), options);
 }

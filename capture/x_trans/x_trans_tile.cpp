@@ -15,8 +15,8 @@ static_assert(ratio_border == 8 && luma_border == 5 && half_gaussian >= 4);
 // Gaussian of 1.5 pixels, normalised.
 constexpr std::array<float, 9> gaussian{0.0076143F, 0.0360740F, 0.1095866F, 0.2134430F, 0.2665642F,
                                         0.2134430F, 0.1095866F, 0.0360740F, 0.0076143F};
-constexpr float least_ratio_mean = 0.004F, least_root = 0.002F;
-constexpr float least_knee = 0.002F;
+constexpr float min_ratio_mean = 0.004F, min_root = 0.002F;
+constexpr float min_knee = 0.002F;
 constexpr float noise_below_zero = 5;  // standard deviations
 constexpr int saturated_reach = 5;     // of a saturated site: the filters' reach, and two pixels of a lamp's edge
 static_assert(saturated_reach >= reach && saturated_reach < margin);
@@ -100,16 +100,16 @@ Tile::Tile(const XTransSetting& setting)
     const double neutral = setting.neutral[c] / setting.neutral[1];
     neutral_[c] = static_cast<float>(neutral);
     white_[c] = 1 / neutral_[c];
-    least_white_ = std::min(least_white_, white_[c]);
+    min_white_ = std::min(min_white_, white_[c]);
     scale += luma_weights[c] * setting.noise_scale / neutral;
     offset += luma_weights[c] * setting.noise_offset / (neutral * neutral);
   }
   luma_scale_ = static_cast<float>(scale);
   luma_offset_ = static_cast<float>(offset);
-  knee_ = least_knee + luma_scale_ + std::sqrt(luma_offset_);
-  least_value_ = -noise_below_zero * std::sqrt(luma_offset_);
-  ratio_floor_ = least_ratio_mean + 2 * luma_scale_;
-  root_offset_ = least_root + 0.375F * luma_scale_;
+  knee_ = min_knee + luma_scale_ + std::sqrt(luma_offset_);
+  min_value_ = -noise_below_zero * std::sqrt(luma_offset_);
+  ratio_floor_ = min_ratio_mean + 2 * luma_scale_;
+  root_offset_ = min_root + 0.375F * luma_scale_;
   if (scale > 0) root_offset_ += static_cast<float>(std::min(offset / scale, 1.0));
 }
 
@@ -120,7 +120,7 @@ void Tile::compute_ratios() {
     for (int y = 0; y < padded; ++y) {
       const float* from = samples_.row(y);
       for (int x = 0; x < padded; ++x)
-        masked[x] = static_cast<std::size_t>(bank[site_at(x, y)].own) == c ? std::min(from[x], least_white_) : 0;
+        masked[x] = static_cast<std::size_t>(bank[site_at(x, y)].own) == c ? std::min(from[x], min_white_) : 0;
       sum_along_row(triangle, masked.data(), half_triangle, padded - half_triangle, row_sums_[c].row(y));
     }
   }
@@ -207,7 +207,7 @@ void Tile::compress_samples() {
     const float* from = samples_.row(y);
     float* to = compressed_.row(y);
     for (int x = margin - reach; x < padded - margin + reach; ++x)
-      to[x] = std::asinh(std::min(from[x], least_white_) / (2 * knee_));
+      to[x] = std::asinh(std::min(from[x], min_white_) / (2 * knee_));
   }
   is_compressed_ = true;
 }
@@ -234,9 +234,9 @@ float Tile::compressed_value(const PlacedFilters& filters, const Base& base, int
 float Tile::value_near_saturation(const PlacedFilters& filters, const Base& base, float value, std::size_t colour,
                                   int x, int y) {
   const Range range = range_of(colour, x, y, 1);
-  if (range.low < least_white_) {
+  if (range.low < min_white_) {
     const float compressed = compressed_value(filters, base, x, y);
-    if (compressed < least_white_) return compressed;
+    if (compressed < min_white_) return compressed;
   }
   return range.high >= white_[colour] ? std::clamp(value, range.low, range.high) : value;
 }
@@ -245,7 +245,7 @@ float Tile::value_at(const PlacedFilters& filters, const Base& base, const Patch
                      int y) {
   const float value = ratio_[colour].row(y)[x] * filtered(filters, base, patch);
   if (near_saturated_.row(y)[x] != 0) return value_near_saturation(filters, base, value, colour, x, y);
-  const bool implausible = value < least_value_ && range_of(colour, x, y, reach).low >= least_value_;
+  const bool implausible = value < min_value_ && range_of(colour, x, y, reach).low >= min_value_;
   return implausible ? compressed_value(filters, base, x, y) : value;
 }
 

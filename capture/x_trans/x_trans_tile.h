@@ -66,9 +66,9 @@ class Tile {
   XTransSetting setting_;
   std::array<float, 3> neutral_{}, white_{};  // relative to green; white over neutral
   float luma_scale_ = 0, luma_offset_ = 0;    // noise of luma
-  float least_white_ = INFINITY;
+  float min_white_ = INFINITY;
   float ratio_floor_ = 0, root_offset_ = 0, knee_ = 0;
-  float least_value_ = 0;                                         // that noise explains where it is dark
+  float min_value_ = 0;                                           // smallest value that noise explains in dark areas
   bool is_compressed_ = false;                                    // the tile that is run
   std::array<std::size_t, padded> row_sites_{}, column_sites_{};  // offsets whose sum is the index of a site
   Plane<float> samples_, luma_, compressed_;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int part = block << (max_levels - 1);  // cells of a tile, each way: one block of the coarsest level
 constexpr int window = 9;
-constexpr std::size_t least_blocks = 8;
+constexpr std::size_t min_blocks = 8;
 constexpr float none = std::numeric_limits<float>::quiet_NaN();
 
 /// Details of a block of 8 x 8, divided by their variance in the model, averaged over R, G, B.
@@ -202,7 +202,7 @@ void Check::add(const Check& other) {
 
 /// Returns the mean of `wanted` over the tenth of the blocks, at least 8, with the smallest `flatness`.
 double mean_of_flattest(std::vector<BlockDetail>& found, double BlockDetail::*flatness, double BlockDetail::*wanted) {
-  const std::size_t count = std::max(least_blocks, found.size() / 10);
+  const std::size_t count = std::max(min_blocks, found.size() / 10);
   const auto last = found.begin() + static_cast<std::ptrdiff_t>(count);
   std::nth_element(found.begin(), last - 1, found.end(),
                    [flatness](const BlockDetail& a, const BlockDetail& b) { return a.*flatness < b.*flatness; });
@@ -214,7 +214,7 @@ double mean_of_flattest(std::vector<BlockDetail>& found, double BlockDetail::*fl
 void Check::finish() {
   for (int l = 0; l < max_levels; ++l) {
     auto& found = blocks[l];
-    if (found.size() < least_blocks) continue;
+    if (found.size() < min_blocks) continue;
     out.measured_over_model[l] = mean_of_flattest(found, &BlockDetail::across, &BlockDetail::diagonal);
     out.across_over_model[l] = mean_of_flattest(found, &BlockDetail::diagonal, &BlockDetail::across);
   }

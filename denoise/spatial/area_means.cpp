@@ -15,8 +15,8 @@ namespace {
 /// over w is (2 a - b) / (3 (a^2 - b^2)^1.5) = 1.179 for a = 3/4, b = 1/4.
 constexpr double interpolated_variance = 1.39;
 
-constexpr double most_variance = 8;  // of a site that counts, over the harmonic mean of its square
-constexpr double most_sigma = 5;     // of a difference that is noise
+constexpr double max_variance = 8;  // of a site that counts, over the harmonic mean of its square
+constexpr double max_sigma = 5;     // of a difference that is noise
 
 /// Sums over the sites of one colour in a square.
 struct SiteSums {
@@ -122,8 +122,8 @@ struct Restoring {
         square,
         [&](std::size_t k, double missing_e, double variance_e2) {
           SiteSums& sum = sums[k];
-          const bool is_lamp = variance_e2 * sum.inverse_variance > most_variance * sum.seen;
-          if (is_lamp || missing_e * missing_e > most_sigma * most_sigma * ratio * variance_e2) return;
+          const bool is_lamp = variance_e2 * sum.inverse_variance > max_variance * sum.seen;
+          if (is_lamp || missing_e * missing_e > max_sigma * max_sigma * ratio * variance_e2) return;
           sum.missing_e += missing_e;
           sum.variance_e2 += variance_e2;
           ++sum.counted;

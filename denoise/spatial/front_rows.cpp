@@ -121,7 +121,7 @@ HWY_INLINE void equalise_losses(const VarianceRow& in, int k, const float* loss)
   constexpr float weight[3][3] = {{0.2f, 0.5f, per_root2}, {0.6f, -1, 0}, {0.2f, 0.5f, -per_root2}};  // k, plane
   const Floats f;
   for (int i = 0; i < in.cells / 2; i += lanes()) {
-    const VF less = hn::Mul(hn::Sub(constant(in.most_ratio), load(in.ratio + i)), pairs(loss, i));
+    const VF less = hn::Mul(hn::Sub(constant(in.max_ratio), load(in.ratio + i)), pairs(loss, i));
     for (int p = 0; p < 3; ++p) {
       const VF change = hn::Mul(constant(weight[k][p]), less);
       for (float* const row : in.plane[p]) {

@@ -56,7 +56,7 @@ struct VarianceRow {
   float balance[3];    // gain of white balance
   float offset_e;      // offset of the stabiliser
   const float* ratio;  // factor of each variance of the row; null: 1, and nothing below is read
-  float most_ratio;    // of the frame
+  float max_ratio;     // largest noise ratio of the frame
   float* plane[3][2];  // L, C1, C2 of the two rows of cells, whose means become those of noise of the largest ratio
 };
 std::size_t variance_scratch(int cells);
@@ -153,7 +153,7 @@ struct UnpackRow {
   float rho;  // < 0: no prior
   float per_gain[3];
   bool red_is_odd;
-  const float* luma_beside[2];  // rows above and below
+  const float* neighbour_luma[2];  // rows above and below
   Slopes slopes;
   float offset_e;  // offset of the stabiliser
   float dark_e[3];

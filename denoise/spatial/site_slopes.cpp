@@ -28,7 +28,7 @@ LumaRows luma_rows(const PlaneSet& planes, int y, int rows) {
   return {planes.row(0, std::max(y - 1, 0)), planes.row(0, y), planes.row(0, std::min(y + 1, rows - 1))};
 }
 
-void take_slopes_off(const PyramidLevel& level, BayerPhase phase, int columns, int rows, const Workers& workers) {
+void subtract_slopes(const PyramidLevel& level, BayerPhase phase, int columns, int rows, const Workers& workers) {
   const SiteSlopes back = site_slopes(phase);
   const SiteSlopes off{-back.c2_x, -back.c2_y, -back.c3_x, -back.c3_y};
   repeat_luma_edges(level.noisy, columns, rows, workers);

@@ -39,6 +39,6 @@ LumaRows luma_rows(const PlaneSet& planes, int y, int rows);
 
 /// Subtracts the slopes from the finest planes of a frame of columns x rows cells, and mirrors C2 and C3 anew beyond
 /// it.
-void take_slopes_off(const PyramidLevel& level, BayerPhase phase, int columns, int rows, const Workers& workers);
+void subtract_slopes(const PyramidLevel& level, BayerPhase phase, int columns, int rows, const Workers& workers);
 
 }  // namespace lowlux::denoise

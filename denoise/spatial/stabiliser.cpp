@@ -8,12 +8,12 @@
 
 namespace lowlux::denoise {
 
-double stabilising_offset(const std::array<double, 3>& dark_e, const RawNoise& noise, double most_ratio,
+double stabilising_offset(const std::array<double, 3>& dark_e, const RawNoise& noise, double max_ratio,
                           const DenoiseOptions& options) {
-  const double scale = most_ratio * *std::max_element(options.variance_scale.begin(), options.variance_scale.end());
+  const double scale = max_ratio * *std::max_element(options.variance_scale.begin(), options.variance_scale.end());
   double offset_e = 0;
   for (std::size_t k = 0; k < 3; ++k) {
-    const double steady_e = 10 * std::max(most_ratio, 1.0) + 2 * scale * (dark_e[k] + noise.variance_e2[k]);
+    const double steady_e = 10 * std::max(max_ratio, 1.0) + 2 * scale * (dark_e[k] + noise.variance_e2[k]);
     offset_e = std::max(offset_e, options.white_gain[k] * steady_e);
   }
   return offset_e;

@@ -23,8 +23,8 @@ namespace lowlux::denoise {
 
 /// Returns c = max over colours of g (10 max(r, 1) + 2 r s (d + sigma^2)) [e-, white-balanced], r being the largest
 /// noise ratio and s the largest DenoiseOptions::variance_scale.
-/// @param dark_e  of R, G, B
-double stabilising_offset(const std::array<double, 3>& dark_e, const RawNoise& noise, double most_ratio,
+/// @param dark_e  dark of R, G, B
+double stabilising_offset(const std::array<double, 3>& dark_e, const RawNoise& noise, double max_ratio,
                           const DenoiseOptions& options);
 
 /// Computes for each tile of 64 x 64 cells (see layout.h) the fraction of the stated variance that was removed: the sum

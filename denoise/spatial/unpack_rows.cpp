@@ -103,7 +103,7 @@ void UnpackCells(const UnpackRow& in, const UnpackedRow& out) {
       left[p] = hn::Mul(hn::Mul(share[p], share[p]), residual[p]);
     }
     store(factor(hn::Mul(constant(0.5f), hn::Add(residual[1], residual[2]))), out.confidence + i);
-    add_slopes(in.luma_beside[0], in.plane[0], in.luma_beside[1], in.slopes, i, c[2], c[3]);
+    add_slopes(in.neighbour_luma[0], in.plane[0], in.neighbour_luma[1], in.slopes, i, c[2], c[3]);
     const SiteValues at = values_of(luma, c[1], c[2], c[3]);
     light_variances(in, out, i, luma, at, left);
     const VF removed = load(in.removed + i);

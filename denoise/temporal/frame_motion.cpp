@@ -112,7 +112,7 @@ class FrameMotion::Search {
       for (int x = std::max(tile_x - 1, 0); x <= std::min(tile_x + 1, tile_count(width_) - 1); ++x) work(x, y);
     }
   }
-  double mean_share(const Rect& blocks) const;
+  double mean_fraction(const Rect& blocks) const;
   float displaced_share(int block_x, int block_y, Displacement by) const;
   bool has_slopes(int block_x, int block_y) const;
   void measure_slopes(const Rect& blocks) const;
@@ -187,7 +187,7 @@ Displacement FrameMotion::Search::of_frame(const Workers& workers) const {
   return gain > frame_significance * of_fine ? by : Displacement{};
 }
 
-double FrameMotion::Search::mean_share(const Rect& blocks) const {
+double FrameMotion::Search::mean_fraction(const Rect& blocks) const {
   double sum = 0;
   for (int y = blocks.y; y < blocks.y + blocks.height; ++y) {
     for (int x = blocks.x; x < blocks.x + blocks.width; ++x) sum += capped(before_.share.at(x, y));
@@ -201,7 +201,7 @@ void FrameMotion::Search::displace_tile(int tile_x, int tile_y, Displacement of_
   best = {};
   const Rect part = cells_of(tile_cells * tile_x, tile_cells * tile_y, tile_cells);
   if (part.width <= 0 || part.height <= 0) return;
-  const double share = mean_share(blocks_of(tile_x, tile_y));
+  const double share = mean_fraction(blocks_of(tile_x, tile_y));
   const double margin = significance * deviation(share, part.width * part.height);
   double least = never;
   const auto attempt = [&](Displacement by, double less) {

@@ -322,7 +322,7 @@ int Stage::process(const lowlux_stage_source& in, const lowlux_stage_picture& ou
   render(out);
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
   if (answers.result != nullptr) {
-    tell(facts, *answers.result);
+    report_facts(facts, *answers.result);
     const MeteredBlack black{pipeline.decided().levels.black.pedestal_dn,
                              pipeline.decision().black == LiveSource::frame};
     if (stream_->exposure->advise(pipeline.frame().raw, black, params, *answers.result)) {
@@ -357,7 +357,7 @@ StageWork Stage::asked_for(const StageFacts& facts) const {
   return averages ? StageWork::frames_before : StageWork::plain;
 }
 
-void Stage::tell(const StageFacts& facts, lowlux_stage_result& out) const {
+void Stage::report_facts(const StageFacts& facts, lowlux_stage_result& out) const {
   const LivePipeline& pipeline = *stream_->pipeline;
   const DevelopPlan& plan = pipeline.decided();
   const LiveDecision& decision = pipeline.decision();

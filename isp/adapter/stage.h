@@ -48,7 +48,7 @@ class Stage {
   int check_source(const lowlux_stage_source& in);
   int check_picture(const lowlux_stage_picture& out);
   void render(const lowlux_stage_picture& out);
-  void tell(const StageFacts& facts, lowlux_stage_result& out) const;
+  void report_facts(const StageFacts& facts, lowlux_stage_result& out) const;
   StageWork done() const;
   StageWork asked_for(const StageFacts& facts) const;
   void count(lowlux_stage_statistics& out) const;

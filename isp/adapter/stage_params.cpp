@@ -12,7 +12,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double mean_reflectance = 0.18;
-constexpr double least_luminance_cd_m2 = 1e-7;
+constexpr double min_luminance_cd_m2 = 1e-7;
 constexpr std::uint64_t longest_step_ns = 2'000'000'000;
 
 bool has(const lowlux_stage_params& params, std::uint32_t bit) { return (params.valid & bit) != 0; }
@@ -84,7 +84,7 @@ void set_light(const lowlux_stage_params& params, StageFacts& out) {
     out.applied |= LOWLUX_STAGE_HAS_SCENE_LUMINANCE;
   } else if (has(params, LOWLUX_STAGE_HAS_LUX) && params.lux > 0 && !(live.iso && live.f_number && live.exposure_s)) {
     // Meters report any small number in the dark.
-    live.scene_luminance_cd_m2 = std::max(mean_reflectance * params.lux / std::numbers::pi, least_luminance_cd_m2);
+    live.scene_luminance_cd_m2 = std::max(mean_reflectance * params.lux / std::numbers::pi, min_luminance_cd_m2);
     out.applied |= LOWLUX_STAGE_HAS_LUX;
   } else {
     out.applied |= params.valid & LOWLUX_STAGE_HAS_F_NUMBER;
@@ -196,7 +196,7 @@ const char* fault_of(const lowlux_stage_params& p) {
       {LOWLUX_STAGE_HAS_NOISE, within(p.noise_gain, 1e-6f, 65535) && within(p.noise_read, 0, 65535),
        "a system gain must be between 1e-6 and 65535 DN per electron, read noise between 0 and 65535 DN"},
       {LOWLUX_STAGE_HAS_F_NUMBER, within(p.f_number, 0.1, 1e3), "an f-number must be between 0.1 and 1000"},
-      {LOWLUX_STAGE_HAS_SCENE_LUMINANCE, within(p.scene_luminance_cd_m2, least_luminance_cd_m2, 1e9),
+      {LOWLUX_STAGE_HAS_SCENE_LUMINANCE, within(p.scene_luminance_cd_m2, min_luminance_cd_m2, 1e9),
        "a luminance must be between 1e-7 and 1e9 cd/m2"},
       {LOWLUX_STAGE_HAS_BUDGET, within(p.budget_ms, 0.01F, 1e6), "a budget must be between 0.01 and 1e6 ms per frame"},
       {~static_cast<std::uint32_t>(LOWLUX_STAGE_HAS_ALL), false, "a bit of valid is unknown"},

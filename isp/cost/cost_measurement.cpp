@@ -189,7 +189,7 @@ class Measurement {
   }
 
   /// Adds the median over the passes to the model, for each part that was measured.
-  void tell(CostModel& model, double pace_s) const {
+  void add_to(CostModel& model, double pace_s) const {
     for (std::size_t part = 0; part < taken_.size(); ++part) {
       if (taken_[part].empty()) continue;
       const bool sampled = part == static_cast<std::size_t>(CostPart::samples);
@@ -258,8 +258,8 @@ Result<CostModel> measure_cost(Executor& executor, const std::function<void(doub
   }
   CostModel model;
   model.threads = executor.width();
-  model.pace_s = pace.usual_s();
-  for (const Measurement& at : all) at.tell(model, model.pace_s);
+  model.pace_s = pace.median_s();
+  for (const Measurement& at : all) at.add_to(model, model.pace_s);
   if (auto done = measure_merge_cost(pace, model.pace_s, executor, model); !done)
     return tl::make_unexpected(done.error());
   return model;

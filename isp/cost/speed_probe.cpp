@@ -21,7 +21,7 @@ Result<double> SpeedProbe::seconds(Executor& executor) {
   return sum;
 }
 
-double SpeedProbe::usual_s() const { return median(taken_s_); }
+double SpeedProbe::median_s() const { return median(taken_s_); }
 
 Result<double> pace_now(SpeedProbe& pace, Executor& executor) {
   std::vector<double> taken_s;

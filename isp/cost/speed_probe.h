@@ -18,7 +18,7 @@ class SpeedProbe {
   /// Returns the time of one run. Errors: those of develop().
   Result<double> seconds(Executor& executor);
   /// Returns the median of all runs so far.
-  double usual_s() const;
+  double median_s() const;
 
  private:
   RawFrame frame_;

@@ -38,9 +38,9 @@ HWY_INLINE void add_columns(const float (&columns)[side], float& even, float& od
 
 /// How the values of a site are combined by the inverse of their variances, at the mean signal of the block.
 struct Mean {
-  float mu;               // mean signal, not negative
-  float reference_share;  // weights of a site's two values
-  float frame_share;
+  float mu;                  // mean signal, not negative
+  float reference_fraction;  // weight of a site's two values
+  float frame_fraction;
   float excess;  // what the mean of the block explains of that of a site
 };
 
@@ -54,10 +54,10 @@ HWY_INLINE Mean mean_of(const BlockNoise& noise, int site, float reference, floa
     return noisy ? r * f / (r + f) : 0;
   };
   Mean out{};
-  shares(0, out.reference_share, out.frame_share);
-  const float mean = count > 0 ? (reference * out.reference_share + frame * out.frame_share) / count : 0;
+  shares(0, out.reference_fraction, out.frame_fraction);
+  const float mean = count > 0 ? (reference * out.reference_fraction + frame * out.frame_fraction) / count : 0;
   out.mu = mean > 0 ? mean : 0;
-  out.excess = unexplained_excess * std::sqrt(shares(out.mu, out.reference_share, out.frame_share));
+  out.excess = unexplained_excess * std::sqrt(shares(out.mu, out.reference_fraction, out.frame_fraction));
   return out;
 }
 
@@ -116,14 +116,14 @@ struct ColumnSums {
 
 /// The figures of a row's sites.
 struct SiteRow {
-  VF mu, reference_share, frame_share, excess, reference_offset, offset;
+  VF mu, reference_fraction, frame_fraction, excess, reference_offset, offset;
 };
 
 HWY_INLINE SiteRow site_row(const BlockNoise& noise, const Mean (&mean)[4], int parity) {
   const Mean &even = mean[2 * parity], &odd = mean[2 * parity + 1];
   return {of_sites(even.mu, odd.mu),
-          of_sites(even.reference_share, odd.reference_share),
-          of_sites(even.frame_share, odd.frame_share),
+          of_sites(even.reference_fraction, odd.reference_fraction),
+          of_sites(even.frame_fraction, odd.frame_fraction),
           of_sites(even.excess, odd.excess),
           of_sites(noise.reference_offset[2 * parity], noise.reference_offset[2 * parity + 1]),
           of_sites(noise.offset[2 * parity], noise.offset[2 * parity + 1])};
@@ -133,7 +133,7 @@ HWY_INLINE SiteRow site_row(const BlockNoise& noise, const Mean (&mean)[4], int 
 HWY_INLINE int add_row(const float* reference, std::ptrdiff_t stride, float* frame, const SiteRow& site, int parity,
                        const BlockNoise& noise, const BlockLimits& limits, ColumnSums& sums) {
   const VF r = load(reference), f = load(frame), d = hn::Sub(f, r);
-  const VF own = hn::Add(hn::Mul(r, site.reference_share), hn::Mul(f, site.frame_share));
+  const VF own = hn::Add(hn::Mul(r, site.reference_fraction), hn::Mul(f, site.frame_fraction));
   const VF mu = hn::Add(site.mu, non_negative(hn::Sub(hn::Sub(own, site.mu), site.excess)));
   VF v = hn::Add(hn::Mul(constant(noise.slope), mu), site.offset);
   if (limits.displacement_variance_px2 > 0) {

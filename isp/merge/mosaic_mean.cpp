@@ -79,7 +79,7 @@ void add_run(const float* value, const WeightOf& weight_of, int first, int last,
 }
 
 constexpr float weight_steps = 256;  // of the weights of ColourMean
-constexpr double least_ratio = 1.0 / 64;
+constexpr double min_ratio = 1.0 / 64;
 
 /// Returns the row of a block in which its frames are counted.
 int counted_row(int block_row, int height) { return std::min(block_row * block_px + block_px / 2, height - 1); }
@@ -109,13 +109,13 @@ class SampleShares {
     column_.back() = column_[column_.size() - 2];
     for (std::size_t x = 0; x < share_.size(); ++x) {
       const float around = (column_[x] + 2 * column_[x + 1] + column_[x + 2]) / 16;
-      share_[x] = std::min(static_cast<float>(here[x]) / std::max(full_share * around, 1.0F), 1.0F);
+      share_[x] = std::min(static_cast<float>(here[x]) / std::max(full_fraction * around, 1.0F), 1.0F);
     }
     return share_;
   }
 
  private:
-  static constexpr float full_share = 0.25F;
+  static constexpr float full_fraction = 0.25F;
 
   std::vector<float> column_, share_;
 };
@@ -256,7 +256,7 @@ ColourMean::Image ColourMean::image(const RowBand& rows, const std::array<double
   for_each_index(executor, ratio.height(), [&](int block_row) {
     const RowBand band{rows.first + block_row * block_px, std::min(rows.first + (block_row + 1) * block_px, rows.last)};
     const std::uint8_t* const frames = frames_.row(band.first / block_px);
-    std::vector<std::array<double, 3>> share_sum(static_cast<std::size_t>(ratio.width()));
+    std::vector<std::array<double, 3>> fraction_sum(static_cast<std::size_t>(ratio.width()));
     SampleShares shares(width());
     for (int y = band.first; y < band.last; ++y) {
       float* const samples = out.samples.row(y - rows.first);
@@ -269,7 +269,7 @@ ColourMean::Image ColourMean::image(const RowBand& rows, const std::array<double
           value = predicted[x];
           if (weight[x] == 0 || frames[x / block_px] == 0) continue;
           value += share[x] * (weight_steps * sum[x] / static_cast<float>(weight[x]) - predicted[x]);
-          share_sum[static_cast<std::size_t>(x / block_px)][c] += static_cast<double>(share[x]);
+          fraction_sum[static_cast<std::size_t>(x / block_px)][c] += static_cast<double>(share[x]);
         }
       }
     }
@@ -277,10 +277,10 @@ ColourMean::Image ColourMean::image(const RowBand& rows, const std::array<double
       const double pixels = (std::min((column + 1) * block_px, width()) - column * block_px) * (band.last - band.first);
       double sum = 0;
       for (std::size_t c = 0; c < 3 && frames[column] > 0; ++c) {
-        sum +=
-            colour_variance(share_sum[static_cast<std::size_t>(column)][c] / pixels, frames[column], c) / variance[c];
+        sum += colour_variance(fraction_sum[static_cast<std::size_t>(column)][c] / pixels, frames[column], c) /
+               variance[c];
       }
-      ratio.at(column, block_row) = static_cast<float>(std::max(sum / 3, least_ratio));
+      ratio.at(column, block_row) = static_cast<float>(std::max(sum / 3, min_ratio));
     }
   });
   return out;

@@ -119,7 +119,7 @@ DropRows::DropRows(PlaneView<const float> differences, BayerPhase phase, const M
 
 const DropRows::Row& DropRows::row(int y) {
   const auto radius = [&](int x) {
-    return colour_at(phase_, x, y) == CfaColour::green ? radius_ : std::max(radius_, least_red_blue_px);
+    return colour_at(phase_, x, y) == CfaColour::green ? radius_ : std::max(radius_, min_red_blue_px);
   };
   rows::drop_row({samples_of(differences_), red_column(phase_), red_row(phase_)}, displaced(motion_, y, dx_px_, dy_px_),
                  {radius(0), radius(1)}, row_.value.data(), row_.weight.data());

@@ -32,7 +32,7 @@ void subtract_prediction(const FrameView& frame, double light, const Motion& mot
 void place_nearest(PlaneView<const float> differences, BayerPhase phase, const Motion& motion,
                    const RgbView<const float>& prediction, PlaneView<float> placed, Executor& executor);
 
-inline constexpr float least_red_blue_px = 4.0F / 3;  // radius of drops of red and blue
+inline constexpr float min_red_blue_px = 4.0F / 3;  // radius of drops of red and blue
 
 /// Places differences as drops, row by row, after drizzling (A. S. Fruchter, R. N. Hook, PASP 114, 2002): each site p
 /// gets the mean of all differences of its colour, weighted by a tent of the distance to p + shift(p),

@@ -78,7 +78,7 @@ std::vector<Finding> published_findings(const DisplayScores& at, const Retargeti
            "Shin's inverse brings images at 2 cd/m2 closer to their look at 250: mean Delta E 94c (Table 5-5)",
            fmt::format("{:.2f} for {:.2f}", inverse.delta_e_94c, unprocessed.delta_e_94c),
            fmt::format("{:.2f} for {:.2f}", mean_delta_e(shin), mean_delta_e(none)),
-           mean_delta_e(shin) < mean_delta_e(none), measured_how(work), Finding::Kind::published,
+           mean_delta_e(shin) < mean_delta_e(none), measurement_method(work), Finding::Kind::published,
            !figures_agree({{inverse.delta_e_94c, mean_delta_e(shin)}, {unprocessed.delta_e_94c, mean_delta_e(none)}})},
           {"retargeting/gamut", "Shin's inverse shows more of the images' gamut at 2 cd/m2: mean EGR (Table 5-6)",
            fmt::format("{:.1f} % for {:.1f} %", inverse.gamut_percent, unprocessed.gamut_percent),

@@ -213,7 +213,7 @@ Result<DisplayScores> scores_on(double display_cd_m2, ShinUnits units, std::span
   return out;
 }
 
-std::string measured_how(const RetargetingWork& work) {
+std::string measurement_method(const RetargetingWork& work) {
   std::size_t colours = 0;
   for (const PictureColours& picture : work.pictures) colours += picture.codes.size();
   return fmt::format(
@@ -233,7 +233,7 @@ std::vector<Plot> plots_of_retargeting(std::span<const DisplayScores> all, const
       plot_over("gamut-pictures", "Remaining gamut of each image at 2 cd/m2", "picture", gamut, {&one, 1}, true)};
   std::string names = "Pictures:";
   for (const PictureColours& picture : work.pictures) names += " " + picture.name;
-  for (Plot& plot : out) plot.caption = names + ". " + measured_how(work) + ".";
+  for (Plot& plot : out) plot.caption = names + ". " + measurement_method(work) + ".";
   return out;
 }
 

@@ -109,7 +109,7 @@ Result<DisplayScores> scores_on(double display_cd_m2, ShinUnits units, std::span
                                 const RetargetingWork& work);
 
 /// Describes coefficients, judge, colours and tables, in one line.
-std::string measured_how(const RetargetingWork& work);
+std::string measurement_method(const RetargetingWork& work);
 
 /// Plots means over all displays, and the images of one display; all with all of retargeting_rows.
 std::vector<Plot> plots_of_retargeting(std::span<const DisplayScores> all, const DisplayScores& one,

@@ -22,7 +22,7 @@ namespace {
 
 using namespace stage_testing;
 
-constexpr int most_width = 128, most_height = 96, stages = 2;
+constexpr int max_width = 128, max_height = 96, stages = 2;
 constexpr std::size_t canary = 64;
 constexpr double longest_call_s = 2;
 // Resident memory may still grow after a fifth of the frames, while rare settings come for the first time. Sanitizers
@@ -118,7 +118,7 @@ class Soak {
   void choose_formats() {
     const auto formats = raw_formats();
     names_ = &formats[static_cast<std::size_t>(chance_.below(static_cast<int>(formats.size())))];
-    in_ = input_of(*names_, chance_.from(2, most_width), chance_.from(2, most_height));
+    in_ = input_of(*names_, chance_.from(2, max_width), chance_.from(2, max_height));
     if (chance_.one_in(3)) {
       in_.crop = {chance_.from(0, in_.width - 2), chance_.from(0, in_.height - 2), 0, 0};
       in_.crop.width = chance_.from(2, in_.width - in_.crop.x);

@@ -34,7 +34,7 @@ TEST(Spectrum, ResamplingKeepsTheIntegralWhenItKeepsTheNodes) {
   EXPECT_NEAR(integrate(*resampled), integrate(ramp()), 1e-12);  // rounding of a sum of five terms
 }
 
-TEST(Spectrum, RefusesWhatIsNoTable) {
+TEST(Spectrum, RefusesFilesThatAreNotTables) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(Spectrum::of({}, {}));
   EXPECT_FALSE(Spectrum::of({400}, {1}));

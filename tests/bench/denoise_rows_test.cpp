@@ -67,7 +67,7 @@ TEST(DenoiseFindings, HoldFromTheirLimitOnAndNotBelow) {
   for (const Finding& finding : good) EXPECT_EQ(finding.kind, Finding::Kind::check);
 }
 
-TEST(DenoiseFindings, TheSlowestLightDecidesSpeedAndBeatenLevelsAreNamed) {
+TEST(DenoiseFindings, TheSlowestLightDecidesSpeedAndDominatedLevelsAreNamed) {
   std::vector<DenoiseRow> rows{
       row("none", MethodKind::other, dim, 0.001, 20, 10),  row("quick one", MethodKind::other, dim, 0.02, 28, 4),
       row("draft", MethodKind::ours, dim, 0.03, 27, 5),    row("high", MethodKind::ours, dim, 0.05, 29, 3),

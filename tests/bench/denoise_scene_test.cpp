@@ -87,7 +87,7 @@ TEST(DenoiseScene, TheExposureWithDarkKeepsTheMeanLuminance) {
   EXPECT_NEAR(patch_means(linear.view())[0].y, patch_means(truth.view())[0].y, 1e-5);  // float kernels
 }
 
-TEST(DenoiseScene, SaturatedSitesHoldTheChargeOfWhiteAndTheirNoiseSaysSo) {
+TEST(DenoiseScene, SaturatedSitesHaveTheChargeAndTheNoiseOfWhite) {
   BenchPicture scene{"lamp", SceneLinear(64, 64)};
   for (Plane<float>& plane : scene.linear.plane) {
     std::fill_n(plane.data(), plane.size(), 0.1F);
@@ -159,7 +159,7 @@ TEST(BenchPicture, EveryPictureIsReadAsADisplayShowsIt) {
   }
 }
 
-TEST(BenchPicture, FilesThatAreNoPicturesAreToldByName) {
+TEST(BenchPicture, FilesThatAreNotImagesAreNamed) {
   const test::ScratchDirectory scratch;
   scratch.write("a.png", "no picture");
   scratch.write("a.exr", "no picture");

@@ -130,7 +130,7 @@ TEST(BlackFigures, LoseThatChargeWhereTheGainIsNotKnown) {
   EXPECT_LT(mean_of(found->level_dn), bench.sensor.black_level_dn + 20 * 0.01) << "of 0.05 e-";
 }
 
-TEST(BlackFigures, TellRowsFromColumnsAndBothFromPixels) {
+TEST(BlackFigures, SeparateRowsColumnsAndPixels) {
   const SensorBench bench{.sensor = dark_200(), .width = 400, .height = 300};
   const RawDn plain = bench.frame({1, 20}, 0);
   const auto white = measure_black(plain);
@@ -170,7 +170,7 @@ TEST(BlackFigures, LeaveHotPixelsOut) {
   EXPECT_GT(hot->excluded_fraction, 1.0 / (32 * 18));
 }
 
-TEST(BlackFigures, RefuseWhatIsNoBlack) {
+TEST(BlackFigures, RefuseFramesThatAreNotDark) {
   const SensorBench bench{.sensor = dark_200(), .width = 128, .height = 128};
   const auto at_zero =
       measure_black(moved(bench.frame({1, 20}, 0), [](int x, int) { return x % 64 == 0 ? -9999 : 0; }));

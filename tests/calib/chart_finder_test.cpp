@@ -55,7 +55,7 @@ TEST(ChartFinder, FindsALargePictureAtTheSizeItsDetectorTakes) {
   expect_found({.width = 2600, .height = 1900, .centre_x = 1200, .centre_y = 900, .cell_px = 300, .angle_deg = 5});
 }
 
-TEST(ChartFinder, TellsAChartInAMirrorByItsColours) {
+TEST(ChartFinder, RecognisesAMirroredChartByItsColours) {
   const auto found = find_chart(test::photographed({.mirrored = true}), lowlux_detect_charts);
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_LT(found->ciede2000, 3);  // CIEDE2000: what a matrix leaves of this camera under another light
@@ -118,7 +118,7 @@ TEST(ChartFinder, RefusesAChartThatDrownsInNoise) {
   EXPECT_NE(found.error().message.find("too dark"), std::string::npos) << found.error().message;
 }
 
-TEST(ChartFinder, SaysThatItsDetectorFailed) {
+TEST(ChartFinder, ReportsAFailedDetector) {
   const auto found =
       find_chart(test::photographed({}), [](const DetectorPicture&, ChartShape*, int) noexcept { return -1; });
   ASSERT_FALSE(found);

@@ -31,14 +31,14 @@ double sum_of(const DarkWeights& w) { return std::accumulate(w.of_level.begin(),
 
 std::string refusal(const std::vector<DarkExposure>& darks, const DarkExposure& picture,
                     const DarkScaling& known = {}) {
-  const auto w = weigh_darks(levels_at(darks), picture, known);
+  const auto w = compute_dark_weights(levels_at(darks), picture, known);
   return w ? "" : w.error().message;
 }
 
 TEST(WeighDarks, TheSameSettingIsThePlainMeanWhateverElseThereIs) {
   auto levels = levels_at({{2, 20}, {10, 20}, {2, 20.8}});
   levels[2].frames = 12;
-  const auto w = weigh_darks(levels, {2.01, 20.1}, {});
+  const auto w = compute_dark_weights(levels, {2.01, 20.1}, {});
   ASSERT_TRUE(w);
   EXPECT_TRUE(w->same_setting);
   EXPECT_EQ(w->of_level, (std::vector<double>{0.25, 0, 0.75}));
@@ -49,7 +49,7 @@ TEST(WeighDarks, TheSameSettingIsThePlainMeanWhateverElseThereIs) {
 TEST(WeighDarks, SeveralTimesGiveALineThatIsExactForWhatIsLinear) {
   for (const double time_s : {0.5, 3.0, 7.0}) {
     const auto levels = levels_at({{0, 20}, {2, 20}, {10, 20}});
-    const auto w = weigh_darks(levels, {time_s, 20}, {});
+    const auto w = compute_dark_weights(levels, {time_s, 20}, {});
     ASSERT_TRUE(w) << time_s;
     EXPECT_NEAR(level_of(*w, levels), pedestal + current * time_s, 1e-9);  // double rounding
     EXPECT_NEAR(sum_of(*w), 1, 1e-12);
@@ -61,7 +61,7 @@ TEST(WeighDarks, SeveralTimesGiveALineThatIsExactForWhatIsLinear) {
 
 TEST(WeighDarks, OneTimeIsScaledAboveThePedestal) {
   const auto levels = levels_at({{4, 20}});
-  const auto w = weigh_darks(levels, {2, 20}, {.pedestal_dn = pedestal});
+  const auto w = compute_dark_weights(levels, {2, 20}, {.pedestal_dn = pedestal});
   ASSERT_TRUE(w);
   EXPECT_EQ(w->of_level, std::vector<double>{0.5});
   EXPECT_EQ(w->of_pedestal, 0.5);
@@ -70,7 +70,7 @@ TEST(WeighDarks, OneTimeIsScaledAboveThePedestal) {
 
 TEST(WeighDarks, OtherTemperaturesAreScaledByTheDoubling) {
   const auto levels = levels_at({{4, 28}});
-  const auto w = weigh_darks(levels, {4, 20}, {.doubling_c = 8, .pedestal_dn = pedestal});
+  const auto w = compute_dark_weights(levels, {4, 20}, {.doubling_c = 8, .pedestal_dn = pedestal});
   ASSERT_TRUE(w);
   EXPECT_EQ(w->of_level, std::vector<double>{0.5});
   EXPECT_EQ(w->doubling_c, 8);
@@ -85,7 +85,7 @@ TEST(WeighDarks, DarksOfTwoTemperaturesTellTheDoublingThemselves) {
     const auto fitted = fitted_doubling_c(levels, std::nullopt);
     ASSERT_TRUE(fitted);
     EXPECT_NEAR(*fitted, doubling_c, 2e-3 * doubling_c);  // half a step of the search
-    const auto w = weigh_darks(levels, {5, 25}, {});
+    const auto w = compute_dark_weights(levels, {5, 25}, {});
     ASSERT_TRUE(w);
     const double truth = pedestal + current * 5 * std::exp2(5 / doubling_c);
     // Off by half a step: ln 2 * 5 / doubling * 0.2 % of the dark charge.
@@ -108,7 +108,7 @@ TEST(WeighDarks, ADoublingThatTheDarksDoNotTellIsNotMadeUp) {
 
 TEST(WeighDarks, BeyondTheDarksThereIsAWarningAndBeyondFourTimesNothing) {
   const auto warned = [](double time_s) {
-    const auto w = weigh_darks(levels_at({{1, 20}, {10, 20}}), {time_s, 20}, {});
+    const auto w = compute_dark_weights(levels_at({{1, 20}, {10, 20}}), {time_s, 20}, {});
     return w && !w->warnings.empty();
   };
   EXPECT_FALSE(warned(5));
@@ -121,7 +121,7 @@ TEST(WeighDarks, BeyondTheDarksThereIsAWarningAndBeyondFourTimesNothing) {
 }
 
 TEST(WeighDarks, TemperaturesThatAreNotStatedAreTakenForEqualAndSaidSo) {
-  const auto w = weigh_darks(levels_at({{4, {}}}), {4, 20}, {});
+  const auto w = compute_dark_weights(levels_at({{4, {}}}), {4, 20}, {});
   ASSERT_TRUE(w);
   EXPECT_EQ(w->of_level, std::vector<double>{1});
   ASSERT_EQ(w->warnings.size(), 1U);

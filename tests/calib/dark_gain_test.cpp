@@ -46,7 +46,7 @@ INSTANTIATE_TEST_SUITE_P(Sensors, GainOfDarks,
                            return name;
                          });
 
-TEST(DarkGain, IntervalsHoldTheTruthAsOftenAsTheySay) {
+TEST(DarkGain, IntervalsContainTheTruthAsOftenAsStated) {
   SensorBench bench{.sensor = test::modern_small(), .width = 64, .height = 64};
   constexpr int seeds = 200;
   int held = 0;

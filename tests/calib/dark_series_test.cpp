@@ -230,7 +230,7 @@ TEST(DarkSeries, ListsTheHotPixelsAndNoOthers) {
   EXPECT_EQ(found->hot_temperature_c, 20);
 }
 
-TEST(DarkSeries, SixteenDarksTellTheDefectsAboveEightDeviationsOfOneFramesTemporalNoise) {
+TEST(DarkSeries, SixteenDarksFindDefectsAboveEightDeviationsOfOneFramesTemporalNoise) {
   SensorBench bench{.sensor = test::modern_small(), .width = 512, .height = 512};
   bench.sensor.hot_pixel_fraction = 0.002;
   bench.sensor.hot_pixel_current_e_per_s = 100;

@@ -113,7 +113,7 @@ TEST(DarkStack, FramesRowsAndPixelsAreSeparatedWithoutBias) {
   }
 }
 
-TEST(DarkStack, TellsRowsFromPixels) {
+TEST(DarkStack, SeparatesRowsFromPixels) {
   std::mt19937 engine(4);
   std::normal_distribution<double> normal;
   DarkStack stack;

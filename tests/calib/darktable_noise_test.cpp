@@ -50,7 +50,7 @@ TEST(DarktableNoise, LeavesOutEntriesThatAreSkippedOrNoNoise) {
   }
 }
 
-TEST(DarktableNoise, RefusesWhatIsNoTable) {
+TEST(DarktableNoise, RefusesFilesThatAreNotTables) {
   const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
   const std::string nan = table_of(entry("100", "NaN", "0"));
   for (const std::string& json : {std::string(), std::string("{"), std::string("[]"), std::string("{}"), deep, nan,

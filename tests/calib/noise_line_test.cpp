@@ -103,8 +103,8 @@ TEST(ReadVariance, OfPixelsAtBlackIsThatOfHalfANormalLaw) {
   const double pi = 3.14159265358979;
   const double mean = 20 / std::sqrt(2 * pi);
   EXPECT_NEAR(read_variance_dn2(line, mean, {0, 1e6}), 400 * (0.5 - 0.5 / pi), 0.1);  // 1/12 of half the pixels
-  EXPECT_NEAR(clipped_share(line, mean, {0, 1e6}), 0.5, 1e-6);
-  EXPECT_EQ(clipped_share(line, mean, wide), 0);
+  EXPECT_NEAR(clipped_fraction(line, mean, {0, 1e6}), 0.5, 1e-6);
+  EXPECT_EQ(clipped_fraction(line, mean, wide), 0);
   EXPECT_EQ(read_variance_dn2(line, 1000, wide), 400);
   EXPECT_NEAR(read_variance_dn2(line, 4000 - mean, {-1e6, 4000}), 400 * (0.5 - 0.5 / pi), 0.1);
 }

@@ -98,7 +98,7 @@ Shots small_shots(const SensorModel& sensor = test::modern_small(), std::uint64_
 }
 
 // Binomial: 200 intervals of 95 % hold the truth in 90 to 99.5 % of cases unless the errors are wrong by 20 % or so.
-TEST(PhotonTransfer, IntervalsHoldTheTruthAsOftenAsTheySay) {
+TEST(PhotonTransfer, IntervalsContainTheTruthAsOftenAsStated) {
   SensorModel truth = test::column_noise_sensor();
   truth.prnu = 0.02;
   const double noise = std::hypot(truth.read_noise_e, truth.row_noise_e);

@@ -148,7 +148,7 @@ TEST(PictureNoise, TellsFilteredNoise) {
   }
 }
 
-TEST(CodeTraces, TellTheStepOfTheCodes) {
+TEST(CodeTraces, DetectTheStepOfTheCodes) {
   const RawDn raw = stairs(1024, 0.8, 6, 100, white_noise);
   EXPECT_EQ(traces_of(raw).code_step_dn, 1);
   RawDn coarse = stairs(1024, 0.8, 6, 100, white_noise);
@@ -158,7 +158,7 @@ TEST(CodeTraces, TellTheStepOfTheCodes) {
   EXPECT_FALSE(traces.companded);
 }
 
-TEST(CodeTraces, TellStepsThatGrow) {
+TEST(CodeTraces, DetectIncreasingSteps) {
   RawDn raw = stairs(1024, 0.8, 6, 100, white_noise);
   EXPECT_FALSE(traces_of(raw).companded);
   for (std::size_t i = 0; i < raw.dn.size(); ++i) {
@@ -238,7 +238,7 @@ TEST(CodeTraces, GridExcessIsThatOfItsDefinitionAtEverySize) {
   EXPECT_GT(with_excess, 20);
 }
 
-TEST(CodeTraces, TellTheGridOfBlocks) {
+TEST(CodeTraces, DetectTheGridOfBlocks) {
   RawDn raw = stairs(1024, 0.8, 6, 100, white_noise);
   EXPECT_FALSE(traces_of(raw).block_grid);
   test::NormalDn level(9);

@@ -109,7 +109,7 @@ TEST(BadInput, TextInOneLineIsTextUnlessItIsARaw) {
   EXPECT_TRUE(has(refused(bytes_of(std::string(100'000, 'a'))), "this is text"));
 }
 
-TEST(BadInput, WhatIsNotARawIsCalledWhatItIs) {
+TEST(BadInput, FilesThatAreNotRawAreNamedByTheirType) {
   EXPECT_TRUE(has(refused(bytes_of("Dear reader,\nthis is a letter and no photograph.\n")), "this is text"));
   EXPECT_TRUE(has(refused(bytes_of("\xFF\xD8\xFF\xE0 and so on")), "a JPEG image"));
   EXPECT_TRUE(has(refused(bytes_of("\x89PNG\r\n\x1a\n")), "a PNG image"));

@@ -85,7 +85,7 @@ TEST(DecoderFrame, BlackIsTheSumOfItsThreeParts) {
   }
 }
 
-TEST(DecoderFrame, ABlackOfZeroBesideStatedMasksIsNotATag) {
+TEST(DecoderFrame, ABlackOfZeroNextToStatedMasksIsNotATag) {
   DecodedRaw raw = decoded();
   raw.header.black = 0;
   const int mask[4] = {2, 0, 28, 5};
@@ -215,7 +215,7 @@ TEST(DecoderFrame, ImpossibleFiguresAreErrors) {
   EXPECT_NE(refused([](auto& h) { h.black = 4000; }).find("not above black level 4000"), std::string::npos);
 }
 
-TEST(DecoderFrame, InfoKeepsWhatIsPlausible) {
+TEST(DecoderFrame, InfoKeepsPlausibleValues) {
   DecodedRaw raw = decoded();
   raw.header.iso = 3200;
   raw.header.exposure_s = 0.5F;

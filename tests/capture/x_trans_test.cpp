@@ -215,10 +215,10 @@ struct Lamp {
   }
 };
 
-Lamp drawn_lamp(std::mt19937& draw, double least_brightness, double largest_brightness) {
+Lamp drawn_lamp(std::mt19937& draw, double min_brightness, double largest_brightness) {
   const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(draw); };
   Lamp lamp{20 + uniform(0, 6), 20 + uniform(0, 6), uniform(1, 2.5), {}, {}};
-  const double brightness = std::exp(uniform(std::log(least_brightness), std::log(largest_brightness))),
+  const double brightness = std::exp(uniform(std::log(min_brightness), std::log(largest_brightness))),
                dark = uniform(0.01, 0.04);
   for (std::size_t c = 0; c < 3; ++c) {
     lamp.peak[c] = brightness * uniform(0.3, 1);

@@ -39,7 +39,7 @@ TEST(BoxMean, IsTheMeanOfTheSquareCutAtTheEdges) {
   EXPECT_TRUE(box_mean(Plane<double>(), 3).empty());
 }
 
-TEST(BoxMean, LeavesOutWhatIsNotFinite) {
+TEST(BoxMean, IgnoresValuesThatAreNotFinite) {
   Plane<double> in(5, 1);
   for (int i = 0; i < 5; ++i) in.data()[i] = i;
   in.data()[1] = nan;

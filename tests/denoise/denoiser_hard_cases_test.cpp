@@ -115,7 +115,7 @@ struct Spot {
 // Four cells beyond the spot and farther, each cell is within five standard deviations, as predicted for the flat
 // without a spot: its variance of R holds 0.36 of that of C1 and half of that of C2. Means over a ring are within 3 %
 // of the truth. Blocks at the border see mirrored noise twice: nothing is asked of them.
-TEST(DenoiserHardCases, SaturatedSpotsLeaveTheColourBesideThemAsItWouldBe) {
+TEST(DenoiserHardCases, SaturatedSpotsDoNotChangeTheColourNextToThem) {
   constexpr double c1_e = (2000 + 500 - 2 * 1000) / 2.0, c2_e = (2000 - 500) / std::numbers::sqrt2;
   for (const Level level : denoise::all_levels) {
     const auto without = Spot{0}.denoised({.level = level});
@@ -208,7 +208,7 @@ TEST(DenoiserHardCases, AnOversubtractedPedestalMovesTheMeanAndNothingElse) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(after[c], before[c] - 2, std::sqrt(5.25 / (256 * 256 / 4.0)));
 }
 
-TEST(DenoiserHardCases, ALightBesideTheDarkLeavesTheDarkNoNoisierThanItWas) {
+TEST(DenoiserHardCases, ALightNextToTheDarkDoesNotIncreaseItsNoise) {
   const Camera camera{.dark_e = {2, 2, 2, 2}};
   const Scene edge = [](int x, int) {
     const double e = x < 128 ? 5 : 5000;  // variances 1 : 540 within a block

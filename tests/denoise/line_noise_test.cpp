@@ -195,7 +195,7 @@ TEST(LineNoise, OfColumnsIsThatOfRowsOfTheTransposedPicture) {
   EXPECT_EQ(by_rows.at(7, 5), static_cast<float>(frame.at(7, 5) - rows->offset_e[5]));
 }
 
-TEST(LineNoise, LeavesOutWhatIsNotFinite) {
+TEST(LineNoise, IgnoresValuesThatAreNotFinite) {
   const std::vector<double> truth = row_offsets(256, 1);
   Plane<float> frame = frame_of(256, 256, even_scene, truth);
   for (int i = 0; i < 256; ++i) frame.at(i, i) = nan;

@@ -10,10 +10,10 @@
 
 namespace {
 
-constexpr int most_pixels = 64;  // each way
+constexpr int max_pixels = 64;  // each way
 
 void keep_within(std::int32_t& size) {
-  if (size < 1 || size > most_pixels) size = 1 + static_cast<int>(static_cast<std::uint32_t>(size) % most_pixels);
+  if (size < 1 || size > max_pixels) size = 1 + static_cast<int>(static_cast<std::uint32_t>(size) % max_pixels);
 }
 
 void end_texts(lowlux::capture::DecodedHeader& header) {

@@ -134,8 +134,8 @@ class StageCalls {
     const bool plain = in_.below(4) != 0;
     lowlux_stage_input out = plain ? any_format(in_) : any_input(in_);
     if (plain) {
-      out.width = 2 + in_.below(most_pixels - 1);
-      out.height = 2 + in_.below(most_pixels - 1);
+      out.width = 2 + in_.below(max_pixels - 1);
+      out.height = 2 + in_.below(max_pixels - 1);
     }
     if (in_.below(8) == 0) out.stride = in_.take<std::uint16_t>();
     if (in_.below(8) == 0) {
@@ -189,7 +189,7 @@ class StageCalls {
     const int left_out = in_.below(8);  // bits: params, result, statistics
     StagePlanes planes(stream_ ? layout_ : lowlux_stage_output{});
     Handed picture(planes.picture, in_);
-    const std::vector<std::uint8_t> codes = any_codes(longest_row, most_pixels);
+    const std::vector<std::uint8_t> codes = any_codes(longest_row, max_pixels);
     const lowlux_stage_source source{codes.data(), codes.size(), longest_row, -1};
     const bool has_params = (left_out & 1) == 0, has_result = (left_out & 2) == 0, counts = (left_out & 4) == 0;
     const int code =

@@ -16,7 +16,7 @@
 /// What the stage's C functions are given by a fuzzer.
 namespace lowlux::test {
 
-inline constexpr int most_pixels = 64;  // each way
+inline constexpr int max_pixels = 64;  // each way
 
 inline lowlux_stage_rect any_rect(FuzzInput& in) {
   lowlux_stage_rect out{};
@@ -42,8 +42,8 @@ inline lowlux_stage_input any_format(FuzzInput& in) {
 inline lowlux_stage_input any_input(FuzzInput& in) {
   lowlux_stage_input out = any_format(in);
   if (in.below(16) == 0) out.fourcc = in.take<std::uint32_t>();
-  out.width = in.below(most_pixels + 1);
-  out.height = in.below(most_pixels + 1);
+  out.width = in.below(max_pixels + 1);
+  out.height = in.below(max_pixels + 1);
   out.crop = any_rect(in);
   out.masked = any_rect(in);
   if (in.below(4) == 0) out.white_level = in.take<double>();

@@ -72,13 +72,13 @@ void set_up(FakeV4l2& fake, FuzzInput& in) {
   if (in.below(8) == 0) fake.buffers_given = in.take<std::uint8_t>();
   if (in.below(8) == 0) fake.buffer_length = in.take<std::uint16_t>();
   // The fake takes memory as a driver would; more than this is refused for its size, or is a lie that mapping finds.
-  constexpr std::uint32_t most_bytes = 1U << 20U;
+  constexpr std::uint32_t max_bytes = 1U << 20U;
   const auto no_more = [answer = std::move(fake.on_set_format)](auto& layout) {
     if (answer) answer(layout);
-    if (layout.buffer_bytes > most_bytes) layout.buffer_bytes = most_bytes;
+    if (layout.buffer_bytes > max_bytes) layout.buffer_bytes = max_bytes;
   };
   fake.on_set_format = no_more;
-  fake.layout.buffer_bytes = std::min(fake.layout.buffer_bytes, most_bytes);
+  fake.layout.buffer_bytes = std::min(fake.layout.buffer_bytes, max_bytes);
 }
 
 lowlux::capture::V4l2Options options(FuzzInput& in) {
@@ -114,7 +114,7 @@ bool live(lowlux::capture::Camera& camera, FakeV4l2& fake, FuzzInput& in) {
     if (!frame) continue;
     require(frame->bytes.size() >= lowlux::capture::frame_bytes(camera.format()));
     lowlux::test::check(lowlux::capture::raw_frame_of(*frame, camera.format(), camera.name()));
-    if (in.below(4) != 0) camera.give_back(*frame);
+    if (in.below(4) != 0) camera.return_buffer(*frame);
   }
   if (const auto controls = camera.take_exposure()) {
     require(controls->min_s > 0 && controls->max_s >= controls->min_s && controls->step_s > 0);

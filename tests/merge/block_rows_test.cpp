@@ -204,8 +204,8 @@ TEST(BlockRows, AreThoseOfTheReferenceForDrawnBlocks) {
     outliers += expected.outliers;
     EXPECT_EQ(static_cast<double>(found.count), expected.count);
     // A difference is that of two values, whose roundings V does not know.
-    const double least_v = *std::ranges::min_element(noise.offset) + 1e-30;
-    const double of_spread = expected.spread + largest * largest * 6e-8 / least_v * expected.count;
+    const double min_v = *std::ranges::min_element(noise.offset) + 1e-30;
+    const double of_spread = expected.spread + largest * largest * 6e-8 / min_v * expected.count;
     expect_near(found.spread, expected.spread, 100 * of_spread);
     expect_near(found.spread_variance, expected.spread_variance, 0);
     for (std::size_t site = 0; site < 4; ++site) {

@@ -219,7 +219,7 @@ TEST(AtomicFile, ALinkThatLeadsNowhereIsInTheWayLikeAFile) {
   EXPECT_FALSE(scratch.holds("nowhere"));
 }
 
-TEST(AtomicFile, ErrorsSayWhatIsInTheWay) {
+TEST(AtomicFile, ErrorsNameTheObstacle) {
   const ScratchDirectory scratch;
   const auto message = [](const std::string& path) {
     const auto out = AtomicFile::create(path, Overwrite::yes);

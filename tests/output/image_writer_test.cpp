@@ -292,7 +292,7 @@ TEST(CheckWritable, FormatsHoldTheSamplesTheyCan) {
   EXPECT_EQ(held(FileFormat::pfm), "nny");
 }
 
-TEST(CheckWritable, RefusalsSayWhatWouldDo) {
+TEST(CheckWritable, RefusalsNameAlternatives) {
   const auto exr = check_writable(FileFormat::exr, SampleType::u8, OutputSpace::linear_srgb);
   ASSERT_FALSE(exr);
   EXPECT_EQ(exr.error().message, "OpenEXR files hold floats, the image is 8-bit");

@@ -66,7 +66,7 @@ TEST(CleanPixels, AreWhatDevelopDoes) {
   const auto seed = static_cast<std::uint32_t>(std::random_device{}());
   std::mt19937 draw(seed);
   std::uniform_real_distribution<double> log_size(0, std::log(300)), log_light(std::log(1), std::log(9000));
-  const double least_saturated = 0.99 - 5 / std::sqrt(pixel_testing::full_e);
+  const double min_saturated = 0.99 - 5 / std::sqrt(pixel_testing::full_e);
   for (int i = 0; i < 12; ++i) {
     const int width = i == 0 ? 1 : static_cast<int>(std::exp(log_size(draw)));
     const int height = i <= 1 ? 1 : static_cast<int>(std::exp(log_size(draw)));
@@ -95,7 +95,7 @@ TEST(CleanPixels, AreWhatDevelopDoes) {
           const auto at_once = static_cast<double>(two.plane[c].data()[k]);
           ASSERT_TRUE(std::isfinite(from_clean));
           if (from_clean >= 1) {
-            ASSERT_GE(at_once, least_saturated);
+            ASSERT_GE(at_once, min_saturated);
           } else {
             ASSERT_NEAR(from_clean, at_once, 1.01 * code + 1e-6 * (1 + std::fabs(at_once)));
           }
@@ -229,7 +229,7 @@ TEST(CleanPixels, BlackStaysSignedAndSaturationStaysWhite) {
   }
 }
 
-TEST(CleanPixels, WhatIsKnownOfTheShotStaysAndWhatWasDoneGoes) {
+TEST(CleanPixels, MetadataRemainAndAppliedCorrectionsAreRemoved) {
   for (const SensorLayout layout : layouts) {
     RawFrame frame = pixel_frame(layout, flat(20, 20, 20), 96, 64, 1);
     frame.raw.active = {16, 2, 80, 60};

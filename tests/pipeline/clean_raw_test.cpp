@@ -86,7 +86,7 @@ TEST(CleanRaw, SaturatedPixelsStayAtWhite) {
   EXPECT_LT(clean.frame.raw.dn.at(20, 20), 10000);
 }
 
-TEST(CleanRaw, WhatIsKnownOfTheShotStaysAndWhatWasDoneGoes) {
+TEST(CleanRaw, MetadataRemainAndAppliedCorrectionsAreRemoved) {
   RawFrame frame = test::night_frame({.phase = BayerPhase::grbg}, flat(10, 20, 15), 96, 64);
   frame.raw.active = {16, 0, 80, 64};
   frame.raw.default_crop = {4, 6, 70, 50};

@@ -25,7 +25,7 @@ TEST(CostModel, IsLinearInTheSizeAndKeepsTheEndsSpeed) {
 }
 
 // 64 cells are the unit of five levels: 672 x 448 pixels become 768 x 512.
-TEST(CostModel, DenoisingCountsWhatIsAppended) {
+TEST(CostModel, DenoisingCountsAppendedPixels) {
   EXPECT_DOUBLE_EQ(cost_size(672, 448).megapixels, 0.301056);
   EXPECT_DOUBLE_EQ(cost_size(672, 448).denoised_megapixels, 0.393216);
   EXPECT_DOUBLE_EQ(cost_size(1728, 1152).denoised_megapixels, 4e-6 * 896 * 576);
@@ -36,7 +36,7 @@ TEST(CostModel, DenoisingCountsWhatIsAppended) {
 }
 
 // 6240 x 4160 pixels go in pieces: cores of 2048 px, 256 px around each where there is as much.
-TEST(CostModel, PiecesCountTheirMargins) {
+TEST(CostModel, TilesCountTheirMargins) {
   RawDn raw;
   raw.active = {0, 0, 4000, 3000};
   raw.default_crop = {8, 8, 3984, 2984};

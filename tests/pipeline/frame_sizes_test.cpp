@@ -218,9 +218,9 @@ TEST(FrameSizes, LiveFramesWithTheirHistoryAreTheTruthInTheMean) {
 }
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
-constexpr std::int64_t most_pixels = 6'000'000;  // what is larger takes minutes
+constexpr std::int64_t max_pixels = 6'000'000;  // what is larger takes minutes
 #else
-constexpr std::int64_t most_pixels = 200'000'000;
+constexpr std::int64_t max_pixels = 200'000'000;
 #endif
 
 // Frames of cameras as a whole, of up to 30 megapixels in another way too, in turn; scripts/nightly takes every way
@@ -228,7 +228,7 @@ constexpr std::int64_t most_pixels = 200'000'000;
 TEST(FrameSizes, CamerasFramesAreTheTruthInTheMean) {
   const bool nightly = std::getenv("LOWLUX_NIGHTLY") != nullptr;
   std::uint32_t ways = 0;
-  for (const std::uint32_t i : test::drawn_cameras(seed, most_pixels)) {
+  for (const std::uint32_t i : test::drawn_cameras(seed, max_pixels)) {
     const auto& [name, size] = test::camera_sizes[i];
     const Case of(i + 1, size);
     SCOPED_TRACE(std::string(name) + ", " + of.text());

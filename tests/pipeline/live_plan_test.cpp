@@ -324,8 +324,8 @@ TEST(LivePlanner, ExposuresThatCannotBeTellNothingOfTheLight) {
   LiveFacts facts = known();
   constexpr double inf = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
   for (const double exposure_s : {0.0, -1.0, -2.0, inf, nan}) {
-    for (const double usual_s : {0.01, exposure_s}) {  // after and before one that can be, and twice
-      facts.exposure_s = usual_s;
+    for (const double median_s : {0.01, exposure_s}) {  // after and before one that can be, and twice
+      facts.exposure_s = median_s;
       ASSERT_TRUE(live->plan(facts));
       facts.exposure_s = exposure_s;
       ASSERT_TRUE(live->plan(facts));

@@ -174,9 +174,9 @@ TEST(NoiseRatioPlan, PredictsVisibleNoiseOfEachHalf) {
   const DevelopPlan plan = planned(frame, options);
   const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, one_thread);
   const auto blocks =
-      seen_blocks(frame, options, plan.levels, plan.rendering, plan.noise_reduction.noise, thumbnail, one_thread);
+      visibility_blocks(frame, options, plan.levels, plan.rendering, plan.noise_reduction.noise, thumbnail, one_thread);
   std::array<test::MeanOf, 2> delta_e, snr;
-  for (const SeenBlock& block : blocks) {
+  for (const VisibilityBlock& block : blocks) {
     delta_e[block.x < 0.5f ? 0 : 1].add(static_cast<double>(block.noise_delta_e));
     snr[block.x < 0.5f ? 0 : 1].add(static_cast<double>(block.snr));
   }

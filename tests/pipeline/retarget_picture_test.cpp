@@ -65,7 +65,7 @@ TEST(RetargetPicture, TellsWhatShareOfThePixelsTheDisplayCannotShow) {
   options.method = RetargetMethod::shin;
   options.display_cd_m2 = 100;
   const RetargetedPicture picture = made(options, SampleType::u8, 1);
-  EXPECT_NEAR(picture.fraction_held, 1.0 / 33, 1e-12) << "the blue column, all pixels being asked";
+  EXPECT_NEAR(picture.fraction_outside_gamut, 1.0 / 33, 1e-12) << "the blue column, all pixels being asked";
   EXPECT_EQ(picture.levels, 33);
   EXPECT_LT(picture.error.mean_ciede2000, retarget_table_tolerance);
   EXPECT_GT(picture.error.max_ciede2000, picture.error.mean_ciede2000);

@@ -166,9 +166,9 @@ TEST(SingleDefects, NoToleranceAndNoBudgetLeavesThemOut) {
   RawFrame frame = copy_of(clean_frame());
   constexpr unsigned seed = 3;
   const auto pixels = add_hot_pixels(frame, seed);
-  const double least_s = cheapest_s(frame);
+  const double min_s = cheapest_s(frame);
   for (const DevelopOptions& options :
-       {planned(100), planned(std::nullopt, 1.001 * least_s), planned(std::nullopt, 10), planned(50, 1)}) {
+       {planned(100), planned(std::nullopt, 1.001 * min_s), planned(std::nullopt, 10), planned(50, 1)}) {
     const auto plan = plan_develop(frame, options, two_threads);
     ASSERT_TRUE(plan) << plan.error().message;
     expect_all_found(*plan, pixels, seed);
@@ -176,9 +176,8 @@ TEST(SingleDefects, NoToleranceAndNoBudgetLeavesThemOut) {
     EXPECT_TRUE(step.used);
     EXPECT_EQ(step.left, 0);
   }
-  EXPECT_FALSE(plan_develop(frame, planned(std::nullopt, 0.999 * least_s), two_threads))
-      << "a smaller budget is refused";
-  DevelopOptions off = planned(std::nullopt, 1.001 * least_s);
+  EXPECT_FALSE(plan_develop(frame, planned(std::nullopt, 0.999 * min_s), two_threads)) << "a smaller budget is refused";
+  DevelopOptions off = planned(std::nullopt, 1.001 * min_s);
   off.find_defects = false;
   EXPECT_TRUE(plan_develop(frame, off, two_threads)->levels.defects.empty());
 }

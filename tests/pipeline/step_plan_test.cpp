@@ -55,14 +55,14 @@ const PlannedStep& named(const StepPlan& plan, std::string_view name) {
 }
 
 TEST(VisibleNoise, PercentileIsThatOfNormalDifferences) {
-  EXPECT_EQ(seen_percentile({}), 0);
+  EXPECT_EQ(visible_percentile({}), 0);
   const std::vector<float> none(10, 0.0f), equal(10, 2.0f);
-  EXPECT_EQ(seen_percentile(none), 0);
+  EXPECT_EQ(visible_percentile(none), 0);
   // 95 % of a normal law lie within so many deviations; half of ten after 24 bisections is 3e-7.
-  EXPECT_NEAR(seen_percentile(equal), 2 * 1.9599639845, 1e-6);
+  EXPECT_NEAR(visible_percentile(equal), 2 * 1.9599639845, 1e-6);
   std::vector<float> few(100, 0.0f);
   few[0] = few[1] = 50;
-  EXPECT_EQ(seen_percentile(few), 0) << "what two blocks of a hundred differ by is above the percentile";
+  EXPECT_EQ(visible_percentile(few), 0) << "what two blocks of a hundred differ by is above the percentile";
 }
 
 // An even grey's means over 8 x 8 pixels, by the noise alone: the prediction against frames that were developed.
@@ -81,10 +81,10 @@ TEST(VisibleNoise, OfAGreyIsWhatFramesDifferBy) {
       }(),
       one_thread);
   noise = with_electrons.noise_reduction.noise;
-  const auto blocks = seen_blocks(frame, with_electrons.options, with_electrons.levels, with_electrons.rendering, noise,
-                                  thumbnail, one_thread);
+  const auto blocks = visibility_blocks(frame, with_electrons.options, with_electrons.levels, with_electrons.rendering,
+                                        noise, thumbnail, one_thread);
   ASSERT_FALSE(blocks.empty());
-  for (const SeenBlock& block : blocks) {
+  for (const VisibilityBlock& block : blocks) {
     EXPECT_NEAR(block.snr, 17, 1.5);  // mean of 200, 400, 400 and 250 e-, its noise and that of readout
     EXPECT_GT(block.noise_delta_e, 0.3f);
     EXPECT_LT(block.noise_delta_e, 3.0f);
@@ -92,9 +92,10 @@ TEST(VisibleNoise, OfAGreyIsWhatFramesDifferBy) {
   }
 }
 
-std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopPlan& plan, const Thumbnail& thumbnail) {
-  return seen_blocks(frame, plan.options, plan.levels, plan.rendering, plan.noise_reduction.noise, thumbnail,
-                     one_thread);
+std::vector<VisibilityBlock> visibility_blocks(const RawFrame& frame, const DevelopPlan& plan,
+                                               const Thumbnail& thumbnail) {
+  return visibility_blocks(frame, plan.options, plan.levels, plan.rendering, plan.noise_reduction.noise, thumbnail,
+                           one_thread);
 }
 
 DevelopPlan exposed(const RawFrame& frame, double ev) {
@@ -113,9 +114,9 @@ TEST(VisibleNoise, SurroundingsAreBrighterBesideALamp) {
   }
   const DevelopPlan plan = exposed(frame, 0);
   const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, one_thread);
-  const auto blocks = seen_blocks(frame, plan, thumbnail);
+  const auto blocks = visibility_blocks(frame, plan, thumbnail);
   int beside = 0;
-  for (const SeenBlock& block : blocks) {
+  for (const VisibilityBlock& block : blocks) {
     const double away_px = (0.5 - static_cast<double>(block.x)) * frame.raw.active.width;
     if (away_px > 24 || away_px < 0) {
       EXPECT_NEAR(block.surroundings, 1, 0.1) << away_px;
@@ -136,7 +137,7 @@ TEST(VisibleNoise, ClippingAtBlackIsSeenInTheDark) {
     const RawFrame frame = grey(green_e);
     const DevelopPlan plan = exposed(frame, 5);
     const Thumbnail thumbnail = make_thumbnail(frame, plan.levels.black, one_thread);
-    for (const SeenBlock& block : seen_blocks(frame, plan, thumbnail)) {
+    for (const VisibilityBlock& block : visibility_blocks(frame, plan, thumbnail)) {
       if (seen) {
         EXPECT_GT(block.clip_delta_e, 0.02f);
         EXPECT_GT(residual_delta_e(std::nullopt, block), block.clip_delta_e);
@@ -178,7 +179,7 @@ TEST(ChromaWork, ReachesTwoTilesBeyondWhatStartsFine) {
 }
 
 // A lamp that fills a block does not make the mean of its tile bright.
-TEST(ChromaWork, GoesByTheMeansOfTiles) {
+TEST(ChromaWork, IsBasedOnTheMeansOfTiles) {
   RawFrame frame = two_greys(300, 0.01, 8, 1280, 128);
   const int dark = frame.raw.dn.at(1000, 100);
   for (int y = 8; y < 128; ++y) std::fill_n(frame.raw.dn.row(y), 8, static_cast<std::uint16_t>(dark));
@@ -247,10 +248,10 @@ TEST(PlanEffects, ABudgetLeavesOutDemosaicingByResidualsOnlyWhereItMust) {
   const auto ample = planned(10);
   ASSERT_TRUE(ample);
   EXPECT_EQ(ample->demosaic.demosaic.method, DemosaicMethod::residual);
-  const double least_s =
+  const double min_s =
       predicted_s(*test::reference_cost(), cost_size(320, 256),
                   {{CostPart::planning}, {CostPart::defects}, {CostPart::codes}, {CostPart::encoded_malvar}});
-  const auto tight = planned(1.01 * least_s);
+  const auto tight = planned(1.01 * min_s);
   ASSERT_TRUE(tight);
   EXPECT_EQ(tight->demosaic.demosaic.method, DemosaicMethod::encoded_malvar);
   EXPECT_FALSE(named(*tight->effects, "demosaicing by residuals").used);
@@ -271,9 +272,9 @@ TEST(PlanEffects, ABudgetBelowTheCheapestPlanIsRefusedWithItsTime) {
       predicted_s(*test::reference_cost(), cost_size(320, 256),
                   {{CostPart::planning}, {CostPart::defects}, {CostPart::codes}, {CostPart::encoded_malvar}});
   EXPECT_NE(refused.error().message.find("cheapest plan"), std::string::npos) << refused.error().message;
-  const double told_ms =
+  const double stated_ms =
       std::strtod(refused.error().message.c_str() + refused.error().message.find("take ") + 5, nullptr);
-  EXPECT_NEAR(told_ms, 1e3 * cheapest_s, 0.5 * 1e3 * cheapest_s) << refused.error().message;
+  EXPECT_NEAR(stated_ms, 1e3 * cheapest_s, 0.5 * 1e3 * cheapest_s) << refused.error().message;
 }
 
 // Dark charge that a profile knows: half of the signal changes the picture, a thousandth does not.
@@ -327,8 +328,8 @@ TEST(FrameSample, LargeFramesAreSampledAtEvenPlacesAndSmallOnesWhole) {
   EXPECT_EQ(squares.back().x, (4001 - 512) & ~1);
 }
 
-std::vector<SeenBlock> blocks_of(double residual_delta_e, double right_delta_e) {
-  std::vector<SeenBlock> out;
+std::vector<VisibilityBlock> blocks_of(double residual_delta_e, double right_delta_e) {
+  std::vector<VisibilityBlock> out;
   for (int i = 0; i < 400; ++i) {
     const int column = i % 20, row = i / 20;
     const float x = (static_cast<float>(column) + 0.5f) / 20;

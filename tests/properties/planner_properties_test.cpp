@@ -59,8 +59,8 @@ RC_GTEST_PROP(CostModelProperty, LargerFramesAndMoreWorkTakeNoLess, ()) {
     RC_ASSERT(seconds > 0 && std::isfinite(seconds));
     RC_ASSERT(cost->seconds(part, large) >= seconds * (1 - 1e-14));
   }
-  const std::vector<CostShare> work{{CostPart::planning}, {CostPart::lines, any_between(0, 1)}};
-  const std::vector<CostShare> more_work{work[0], work[1], {CostPart::look, any_between(0, 1)}};
+  const std::vector<CostTerm> work{{CostPart::planning}, {CostPart::lines, any_between(0, 1)}};
+  const std::vector<CostTerm> more_work{work[0], work[1], {CostPart::look, any_between(0, 1)}};
   RC_ASSERT(predicted_s(*cost, small, more_work) >= predicted_s(*cost, small, work));
 }
 
@@ -87,7 +87,7 @@ StepFacts any_facts(const ProcessingGoal& choice) {
   out.sizes = {.measured_fraction = any_between(0, 1), .defects = size(), .lines = size(), .display = size()};
   out.sizes.dark = *rc::gen::element(0.0, any_decade(-2, 1));
   out.may_search = *rc::gen::arbitrary<bool>();
-  out.may_take_lines = out.has_noise && *rc::gen::arbitrary<bool>();
+  out.may_subtract_lines = out.has_noise && *rc::gen::arbitrary<bool>();
   out.from_codes = *rc::gen::arbitrary<bool>();
   if (*rc::gen::arbitrary<bool>()) {
     out.demosaic_reduced = *rc::gen::element(DemosaicMethod::residual, DemosaicMethod::residual_median);

@@ -161,7 +161,7 @@ TEST(MaskedBlack, OddActiveOriginsKeepSitesApart) {
   }
 }
 
-TEST(BlackPoint, AutomaticPrefersMaskedPixelsAndSaysThatTheyHoldTheDarkCharge) {
+TEST(BlackPoint, AutomaticPrefersMaskedPixelsWhichIncludeTheDarkCharge) {
   const auto black = choose_black(frame_with_masked_columns(8), {BlackChoice::automatic});
   ASSERT_TRUE(black);
   EXPECT_EQ(black->source, BlackPoint::Source::masked_pixels);

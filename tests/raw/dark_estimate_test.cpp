@@ -202,7 +202,7 @@ TEST(DarkEstimate, IsCoveredUnderPhotonNoise) {
   EXPECT_LT(std::fabs(sum / draws), 0.1 * dark);
 }
 
-TEST(DarkEstimate, IsRefusedWhereDarkAndLightCannotBeToldApart) {
+TEST(DarkEstimate, IsRefusedIfDarkAndLightCannotBeSeparated) {
   EXPECT_FALSE(estimate_of(blocks_of({.dark_e = {50, 50, 50}, .max_light_e = 0}))) << "no light";
   EXPECT_FALSE(estimate_of(blocks_of({.dark_e = {50, 50, 50}, .neutral = {1, 1, 1}}))) << "light equal in all channels";
   EXPECT_FALSE(estimate_of(blocks_of({.dark_e = {50, 50, 50}, .width = 7, .height = 9}))) << "63 blocks";

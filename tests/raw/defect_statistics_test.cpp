@@ -80,7 +80,7 @@ Tally defects_found(double mean_e, int frames) {
   return tally;
 }
 
-TEST(DefectStatistics, OnePictureTellsNineTenthsOfTheHotPixelsAndHardlyAnyOther) {
+TEST(DefectStatistics, OneImageFindsNineTenthsOfTheHotPixelsAndHardlyAnyOther) {
   // 1200 e- are the hot sensor of tests/sensor_bench after 4 s.
   for (const double mean_e : {300.0, 1200.0}) {
     const Tally t = defects_found(mean_e, 6);

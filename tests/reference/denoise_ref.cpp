@@ -25,7 +25,7 @@ struct Frame {
   PerSite<int> site;
   int columns, rows, levels;
   std::array<double, 4> dark_e, gain, variance_e2;
-  double most_ratio = 0;
+  double max_ratio = 0;
   double offset_e = 0;  // c of h(x), see below
   Four value;           // of each cell's sites
   Four sum_of_nine;     // along a row, of the values around each
@@ -42,13 +42,13 @@ struct Frame {
     const double scale = *std::max_element(o.variance_scale.begin(), o.variance_scale.end());
     for (int y = 0; y < raw.noise_ratio.ratio.height; ++y) {
       for (int x = 0; x < raw.noise_ratio.ratio.width; ++x) {
-        most_ratio = std::max(most_ratio, static_cast<double>(raw.noise_ratio.ratio.at(x, y)));
+        max_ratio = std::max(max_ratio, static_cast<double>(raw.noise_ratio.ratio.at(x, y)));
       }
     }
-    if (raw.noise_ratio.is_one()) most_ratio = 1;
+    if (raw.noise_ratio.is_one()) max_ratio = 1;
     for (int k = 0; k < 4; ++k) {
       offset_e = std::max(
-          offset_e, gain[k] * (10 * std::max(most_ratio, 1.0) + 2 * most_ratio * scale * (dark_e[k] + variance_e2[k])));
+          offset_e, gain[k] * (10 * std::max(max_ratio, 1.0) + 2 * max_ratio * scale * (dark_e[k] + variance_e2[k])));
     }
     for (int k = 0; k < 4; ++k) set_values(k);
   }
@@ -194,7 +194,7 @@ Four decorrelated(const Frame& frame, Four& variance) {
   for (Image& image : loss) image = down2(image);
   for (int cy = 0; cy < h; ++cy) {
     for (int cx = 0; cx < w; ++cx) {
-      const double less = frame.most_ratio - ratio_at_cell(frame.raw, cx, cy);
+      const double less = frame.max_ratio - ratio_at_cell(frame.raw, cx, cy);
       const auto at = [&](int k) { return less * loss[k].at(cx / 2, cy / 2); };
       out[0].at(cx, cy) -= 0.2 * (at(0) + at(3)) + 0.3 * (at(1) + at(2));
       out[1].at(cx, cy) -= 0.5 * (at(0) + at(3) - at(1) - at(2));
@@ -346,7 +346,7 @@ Image removed_noise(const Frame& frame, const Four& noisy, const Four& variance,
   for (int ty = 0; ty < out.height; ++ty) {
     for (int tx = 0; tx < out.width; ++tx) {
       const double part = stated.at(tx, ty) > 0 ? removed.at(tx, ty) / stated.at(tx, ty) : 0;
-      out.at(tx, ty) = frame.most_ratio - (1 - part) * ratio_of_tile(frame.raw, tx, ty, out.width, out.height);
+      out.at(tx, ty) = frame.max_ratio - (1 - part) * ratio_of_tile(frame.raw, tx, ty, out.width, out.height);
     }
   }
   return out;

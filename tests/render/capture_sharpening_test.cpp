@@ -64,7 +64,7 @@ double variance_of(const SceneLinear& in) {
   return squares / n - (sum / n) * (sum / n);
 }
 
-constexpr double luminance_share = 0.25 * 0.25 + 0.5 * 0.5 + 0.25 * 0.25;  // of independent channels
+constexpr double luminance_fraction = 0.25 * 0.25 + 0.5 * 0.5 + 0.25 * 0.25;  // of independent channels
 
 TEST(CaptureSharpening, TheNoiseOfAFlatImageIsNotRaised) {
   for (const float blur : {0.3f, 0.6f, 0.9f, 1.5f}) {
@@ -72,7 +72,7 @@ TEST(CaptureSharpening, TheNoiseOfAFlatImageIsNotRaised) {
       for (const double level : {0.0, 0.3}) {
         const SceneLinear in = noise_image(level, std, 5);
         const double before = variance_of(in);
-        const double after = variance_of(sharpened(in, {.blur_px = blur}, std * std * luminance_share));
+        const double after = variance_of(sharpened(in, {.blur_px = blur}, std * std * luminance_fraction));
         EXPECT_LE(after, 1.01 * before) << blur << " " << std << " seed 5";
         EXPECT_GE(after, before) << "sharpening takes nothing away";
       }
@@ -136,7 +136,7 @@ TEST(CaptureSharpening, EdgesOfAKnownBlurComeNearerToTheTruth) {
     for (const double std : {1e-4, 0.005, 0.02}) {
       SceneLinear in = blurred_scene(blur);
       add_noise(in, std, 17);
-      const SceneLinear out = sharpened(in, {.blur_px = static_cast<float>(blur)}, std * std * luminance_share);
+      const SceneLinear out = sharpened(in, {.blur_px = static_cast<float>(blur)}, std * std * luminance_fraction);
       const double before = rms(in, truth), after = rms(out, truth);
       std::printf("  blur %.1f px, noise %.4f: rms %.4f, sharpened %.4f\n", blur, std, before, after);
       // At 0.02 most detail that blur took is below the noise, and is left.

@@ -356,7 +356,7 @@ TEST(ColourTable, HasNoSeams) {
   }
 }
 
-TEST(ColourTable, TakesWhatIsNoColour) {
+TEST(ColourTable, AcceptsValuesThatAreNotColours) {
   for (const ColourTable* table : {&entropy_table(), &compressive_table()}) {
     const Pixels in{{0, 0, 0},           {not_a_number, not_a_number, not_a_number},
                     {0.2f, 0.5f, 0},     {0.2f, 0.5f, not_a_number},

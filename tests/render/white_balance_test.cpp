@@ -43,7 +43,7 @@ CameraColour nikon(const std::string& light) {
   return test::photograph_chart({"Nikon_D5100", light, {"A", "D65"}})->colour;
 }
 
-TEST(AsShotWhiteBalance, IsTheNeutralOrTheWhiteTheFileTells) {
+TEST(AsShotWhiteBalance, IsTheNeutralOrTheWhiteThatTheFileStates) {
   CameraColour colour = nikon("D50");
   const Vector3 neutral = *colour.as_shot_neutral;
   colour.as_shot_neutral = Vector3{2 * neutral[0], 2 * neutral[1], 2 * neutral[2]};
@@ -61,7 +61,7 @@ TEST(AsShotWhiteBalance, IsTheNeutralOrTheWhiteTheFileTells) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(by_white->neutral[i], neutral[i], 1e-6);
 }
 
-TEST(AsShotWhiteBalance, IsAnErrorWhereTheFileTellsNothingOrNonsense) {
+TEST(AsShotWhiteBalance, IsAnErrorIfTheFileStatesNoneOrAnImpossibleOne) {
   CameraColour colour = nikon("D65");
   colour.as_shot_neutral = Vector3{0, 1, 1};
   EXPECT_EQ(as_shot_white_balance(colour).error().code, ErrorCode::malformed);
@@ -217,7 +217,7 @@ TEST(AutoWhiteBalance, FallsBackWithAReasonWhereThereIsTooLittleSignal) {
   EXPECT_NE(none.reason, "");
 }
 
-TEST(AutoWhiteBalance, WithoutMatricesIsNotHeldAndSaysSo) {
+TEST(AutoWhiteBalance, WithoutMatricesItIsNotLimitedWithAWarning) {
   const CameraRgb blocks = thumbnail_of(std::vector<Vector3>(100, {0.1, 0.8, 0.1}));
   const WhiteBalance found = auto_white_balance(view_of(blocks), 0, CameraColour{});
   EXPECT_EQ(found.source, WhiteSource::estimated);

@@ -187,7 +187,7 @@ void expect_unbeaten(const Camera& camera, const AdviceRequest& r, const Exposur
 }
 
 /// The share of a highlight's green pixels that read what a full pixel or converter reads.
-double clipped_share(const Camera& camera, const AdviceRequest& r, std::size_t gain, double time_s) {
+double clipped_fraction(const Camera& camera, const AdviceRequest& r, std::size_t gain, double time_s) {
   const SensorModel& s = camera.sensors[gain].model;
   const auto source = flat_of(camera, gain, r.highlight_cd_m2, time_s, r.temperature_c);
   InlineExecutor executor;
@@ -206,11 +206,11 @@ double clipped_share(const Camera& camera, const AdviceRequest& r, std::size_t g
 /// At the advised exposure no more of the highlight clips than allowed, at twice the exposure nearly all of it.
 void expect_at_the_wall(const Camera& camera, const AdviceRequest& r, const ExposureAdvice& advice) {
   const AdvicePoint& best = advice.gains[advice.best].at;
-  const double share = clipped_share(camera, r, best.gain, best.exposure_s);
-  const double error = std::sqrt(r.clipped_share / (side * side / 2.0));
-  EXPECT_LE(share, r.clipped_share + 5 * error);
-  EXPECT_GE(share, r.clipped_share / 2 - 5 * error) << "exposed less than it might be";  // codes are 1 to 3 e- wide
-  EXPECT_GT(clipped_share(camera, r, best.gain, 2 * best.exposure_s), 0.99);
+  const double share = clipped_fraction(camera, r, best.gain, best.exposure_s);
+  const double error = std::sqrt(r.clipped_fraction / (side * side / 2.0));
+  EXPECT_LE(share, r.clipped_fraction + 5 * error);
+  EXPECT_GE(share, r.clipped_fraction / 2 - 5 * error) << "exposed less than it might be";  // codes are 1 to 3 e- wide
+  EXPECT_GT(clipped_fraction(camera, r, best.gain, 2 * best.exposure_s), 0.99);
   EXPECT_TRUE(isp::predicted_point(r, best.gain, 2 * best.exposure_s).exceeds);
 }
 

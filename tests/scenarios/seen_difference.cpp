@@ -22,26 +22,26 @@ class ColumnSums {
  public:
   ColumnSums(const RgbView<const float>& picture, int top) : picture_(picture), top_(top) {
     for (auto& plane : sum_) plane.resize(static_cast<std::size_t>(picture[0].width));
-    for (int y = top; y < top + seen_box_px; ++y) add(y, 1);
+    for (int y = top; y < top + visible_box_px; ++y) add(y, 1);
   }
   void move_to(int top) {
     for (; top_ < top; ++top_) {
-      add(top_ + seen_box_px, 1);
+      add(top_ + visible_box_px, 1);
       add(top_, -1);
     }
   }
   /// Lab of the squares of this row, left to right.
   void labs(const Matrix3& to_xyz, const Xyz& white, std::vector<Lab>& out) const {
     Vector3 box{};
-    constexpr double pixels = seen_box_px * seen_box_px;
+    constexpr double pixels = visible_box_px * visible_box_px;
     for (int x = 0; x < picture_[0].width; ++x) {
       for (std::size_t c = 0; c < 3; ++c) {
         box[c] += sum_[c][static_cast<std::size_t>(x)];
-        if (x >= seen_box_px) box[c] -= sum_[c][static_cast<std::size_t>(x) - seen_box_px];
+        if (x >= visible_box_px) box[c] -= sum_[c][static_cast<std::size_t>(x) - visible_box_px];
       }
-      if (x < seen_box_px - 1) continue;
+      if (x < visible_box_px - 1) continue;
       const Vector3 mean{box[0] / pixels, box[1] / pixels, box[2] / pixels};
-      out[static_cast<std::size_t>(x) - (seen_box_px - 1)] = lab_of(xyz_of(to_xyz * mean), white);
+      out[static_cast<std::size_t>(x) - (visible_box_px - 1)] = lab_of(xyz_of(to_xyz * mean), white);
     }
   }
 
@@ -152,8 +152,8 @@ double PixelDifference::around(int x, int y) const {
 SeenDifference seen_difference(const RgbView<const float>& first, const RgbView<const float>& second,
                                Executor& executor, int row_step) {
   assert(first[0].width == second[0].width && first[0].height == second[0].height);
-  assert(first[0].width >= seen_box_px && first[0].height >= seen_box_px);
-  Plane<float> difference(first[0].width - seen_box_px + 1, (first[0].height - seen_box_px) / row_step + 1);
+  assert(first[0].width >= visible_box_px && first[0].height >= visible_box_px);
+  Plane<float> difference(first[0].width - visible_box_px + 1, (first[0].height - visible_box_px) / row_step + 1);
   const Work work{first, second, difference, row_step, executor.width()};
   for_each_index(executor, work.bands, [&](int band) { compare_band(work, band); });
   return statistics_of({difference.data(), difference.data() + difference.size()});

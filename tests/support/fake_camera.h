@@ -47,7 +47,7 @@ class FakeCamera final : public capture::Camera {
     if (event) event->buffer = lent++;
     return event;
   }
-  void give_back(const capture::CameraFrame& frame) override {
+  void return_buffer(const capture::CameraFrame& frame) override {
     last_returned = frame.buffer;
     ++returned;
   }

@@ -76,7 +76,7 @@ class FakeV4l2 {
   std::function<void(std::uint32_t id)> on_set_control;
   std::optional<std::uint32_t> buffers_given;
   std::optional<std::uint32_t> buffer_length;
-  std::optional<std::uint32_t> length_told;  // a false length
+  std::optional<std::uint32_t> stated_length;  // a false length
   int map_errno = 0;
 
   // Faults: errno of the open or of one request; for `calls` calls, after `good_before` good ones.

@@ -166,7 +166,7 @@ int FakeV4l2::request_buffers(void* argument) {
 int FakeV4l2::query_buffer(void* argument) const {
   auto& told = *static_cast<v4l2_buffer*>(argument);
   if (told.index >= memory_.size()) return EINVAL;
-  const auto length = length_told.value_or(static_cast<std::uint32_t>(memory_[told.index]->bytes.size()));
+  const auto length = stated_length.value_or(static_cast<std::uint32_t>(memory_[told.index]->bytes.size()));
   if (is_multi_planar_) {
     told.m.planes[0].length = length;
     told.m.planes[0].m.mem_offset = told.index << 12;

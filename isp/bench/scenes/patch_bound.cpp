@@ -8,7 +8,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double least_weight_snr = 5;
+constexpr double min_weight_snr = 5;
 constexpr double cells = bound_patch_px * bound_patch_px / 4.0;
 
 Matrix3 linear_to_xyz() { return rgb_to_xyz(primaries_rec709).value(); }  // of primaries that form a triangle
@@ -39,7 +39,7 @@ PatchBound::PatchBound(const BenchPicture& picture, const DenoiseShot& shot) {
                       .pixels = {cells, 2 * cells, cells}};
       for (std::size_t c = 0; c < 3; ++c) patch.signal_e[c] *= shot.white_e / bench_white_gain[c];
       const auto known = chroma_crb(linear_to_xyz() * diagonal3(bench_white_gain), patch);
-      if (!known || known->weight_snr < least_weight_snr) continue;
+      if (!known || known->weight_snr < min_weight_snr) continue;
       patches_.push_back({x, y, known->uv});
       sum += std::pow(rss_std(known->uv_covariance), 2);
     }

@@ -25,11 +25,11 @@ constexpr Exposure flat_exposure{.time_s = 0.01, .temperature_c = 20};          
 
 /// Relative errors of values that were measured many times.
 struct FitErrors {
-  double gain_square = 0, told_square = 0, noise_square = 0;
+  double gain_square = 0, stated_square = 0, noise_square = 0;
   int fits = 0, refused = 0;
 
   double gain() const { return std::sqrt(gain_square / fits); }
-  double told() const { return std::sqrt(told_square / fits); }
+  double told() const { return std::sqrt(stated_square / fits); }
   double noise() const { return std::sqrt(noise_square / fits); }
 };
 
@@ -95,14 +95,14 @@ double dark_noise_e(const SensorModel& s) {
 void add(FitErrors& errors, const calib::PhotonTransfer& found, const SensorModel& s) {
   const auto& gain = found.system_gain_dn_per_e;
   errors.gain_square += std::pow(gain.value / s.system_gain_dn_per_e - 1, 2);
-  errors.told_square += std::pow(gain.standard_error / s.system_gain_dn_per_e, 2);
+  errors.stated_square += std::pow(gain.standard_error / s.system_gain_dn_per_e, 2);
   errors.noise_square += std::pow(found.read_noise_e.value().value / dark_noise_e(s) - 1, 2);  // darks are dithered
   ++errors.fits;
 }
 
 /// Checks the fit's standard error. A root mean square of n normal deviates has the relative standard error sqrt(1 / (2
 /// n)).
-Finding told_finding(const std::string& id, const FitErrors& errors) {
+Finding stated_error_finding(const std::string& id, const FitErrors& errors) {
   const double ratio = errors.gain() / errors.told(), allowed = confidence_errors * std::sqrt(0.5 / errors.fits);
   return check_of("noise-fit/" + id,
                   "the error of the gain equals the standard error of the fit, within five of its own standard errors",
@@ -126,7 +126,7 @@ Result<void> measure_flats(const BenchOptions& options, StageRows& rows, std::ve
     }
     const std::string name =
         fmt::format("{0} x {0} px, {1} pair{2}", amount.side, amount.pairs, amount.pairs > 1 ? "s" : "");
-    findings.push_back(told_finding(fmt::format("told-{}-{}", amount.side, amount.pairs), errors));
+    findings.push_back(stated_error_finding(fmt::format("told-{}-{}", amount.side, amount.pairs), errors));
     figures.push_back({errors.noise(), errors.told(), 0, 1.0 * errors.fits});
     group.levels.push_back({name, errors.gain(), [flats] { (void)flats->fit(); }, 1});
     options.advance(0.5 / static_cast<double>(amounts.size()), name);
@@ -181,7 +181,7 @@ FitErrors errors_in(const std::vector<NoisyPicture>& shots, double lightless_e, 
       continue;
     }
     errors.gain_square += std::pow(found->gain_dn_per_e.value / k - 1, 2);
-    errors.told_square += std::pow(found->gain_dn_per_e.standard_error / k, 2);
+    errors.stated_square += std::pow(found->gain_dn_per_e.standard_error / k, 2);
     const double noise_e = std::sqrt(std::max(0.0, found->offset_dn2.value - quantisation_dn2)) / k;
     errors.noise_square += std::pow(noise_e / lightless_e - 1, 2);
     ++errors.fits;

@@ -73,7 +73,7 @@ bool forget_largest_resident() {
 }
 
 /// Runs the work in the child and sends the added memory to the parent.
-[[noreturn]] void tell(int to, const std::function<bool()>& work) {
+[[noreturn]] void send_result(int to, const std::function<bool()>& work) {
   malloc_trim(0);  // freed memory would otherwise be reused and not counted
   const bool forgotten = forget_largest_resident();
   const double before = largest_resident_bytes();
@@ -279,7 +279,7 @@ std::optional<double> peak_bytes_of(const std::function<bool()>& work) {
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0) return std::nullopt;
   const pid_t child = fork();
-  if (child == 0) tell(ends[1], work);
+  if (child == 0) send_result(ends[1], work);
   close(ends[1]);
   double added = -1;
   const bool heard = child > 0 && read(ends[0], &added, sizeof added) == static_cast<ssize_t>(sizeof added);

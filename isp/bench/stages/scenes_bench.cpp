@@ -140,18 +140,18 @@ void add_rows(const std::string& name, std::vector<Sample>& samples, Developer& 
 std::vector<Finding> gain_findings(const StageRows& rows) {
   constexpr double tolerance_db = 0.1;
   std::vector<Finding> out;
-  double none_db = 0, least_db = 0;
+  double none_db = 0, min_db = 0;
   for (std::size_t i = 0; i < rows.rows.size(); ++i) {
     const AccuracyRow& row = rows.rows[i];
     const double psnr_db = rows.figures[i][0];
     if (row.level == name_of_none) none_db = psnr_db;
     const auto is_level = [&](denoise::Level level) { return row.level == name_of(level); };
     if (!std::ranges::any_of(denoise::all_levels, is_level)) continue;
-    least_db = is_level(denoise::all_levels.front()) ? psnr_db : std::min(least_db, psnr_db);
+    min_db = is_level(denoise::all_levels.front()) ? psnr_db : std::min(min_db, psnr_db);
     if (!is_level(denoise::all_levels.back())) continue;
     out.push_back(check_of("scenes/gain/" + row.group, "PSNR of the worst level minus PSNR without noise reduction",
                            fmt::format("at least {:+.1f} dB", -tolerance_db),
-                           fmt::format("{:+.2f} dB", least_db - none_db), least_db - none_db >= -tolerance_db));
+                           fmt::format("{:+.2f} dB", min_db - none_db), min_db - none_db >= -tolerance_db));
   }
   return out;
 }

@@ -75,7 +75,7 @@ class EffectsLight {
       shot.blocks = capture::block_levels(out.frame_of(shot));
       capture::read_out(out.frame_of(shot), out.plan_of(shot, choices().front()), executor, shot.all_dn.view());
       out.megapixels_ += 1e-6 * static_cast<double>(shot.all_dn.size());
-      out.most_width_ = std::max(out.most_width_, shot.all_dn.width());
+      out.max_width_ = std::max(out.max_width_, shot.all_dn.width());
       out.max_height_ = std::max(out.max_height_, shot.all_dn.height());
     }
     return out;
@@ -83,8 +83,8 @@ class EffectsLight {
 
   /// Returns the levels and their errors, and adds changes and findings for each choice.
   AccuracyGroup measure(std::vector<std::vector<double>>& figures, std::vector<Finding>& findings) {
-    AccuracyGroup group{light_.name, "largest CIEDE2000 of block means against all effects", {}};
-    auto dn = std::make_shared<Plane<float>>(most_width_, max_height_);
+    AccuracyGroup group{light_.name, "largest CIEDE2000 of block means, compared with all noise sources", {}};
+    auto dn = std::make_shared<Plane<float>>(max_width_, max_height_);
     Closest of_tolerance, of_prediction;
     for (const Choice& choice : choices()) {
       std::vector<NoiseSourcePlan> plans;
@@ -212,7 +212,7 @@ class EffectsLight {
   NamedSensor camera_;
   std::vector<PictureShot> shots_;
   double megapixels_ = 0;
-  int most_width_ = 0, max_height_ = 0;
+  int max_width_ = 0, max_height_ = 0;
 };
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int min_side_px = 16;
 constexpr int max_search_side = 256;               // cells of the finest level that all motions are compared on
-constexpr int most_candidates = 12;                // motions that are refined
+constexpr int max_candidates = 12;                 // motions that are refined
 constexpr double significant_log_likelihood = 30;  // chance reaches it with a probability below exp(-30) for a motion
 constexpr int max_passes = 4;                      // of one level
 constexpr double converged_cells = 0.02;
@@ -90,11 +90,11 @@ std::optional<std::size_t> search_motion(Alignment& a) {
     const MotionComparison comparison(reference, frame, a.pair(level));
     const bool is_first = level + 1 == a.reference.levels.size();
     if (!is_first) motions.push_back({});  // no motion: a pattern that repeats may have left it out
-    motions = is_first ? comparison.search(a.range, most_candidates, a.executor)
-                       : comparison.refine(motions, a.range, most_candidates / 2, a.executor);
+    motions = is_first ? comparison.search(a.range, max_candidates, a.executor)
+                       : comparison.refine(motions, a.range, max_candidates / 2, a.executor);
     // The steps of all finer levels, 1/2 + 1/4 + ..., do not make up for an error of one step on the coarsest.
     if (!is_first) motions = refined_first(comparison, std::move(motions), a);
-    const RatedMotion best = comparison.smallest_of_best(motions, a.range);
+    const RatedMotion best = comparison.smallest_near_best(motions, a.range);
     if (best.log_likelihood > best_likelihood) {
       best_likelihood = best.log_likelihood;
       a.motion = best.motion.in(a.range.width, a.range.height);

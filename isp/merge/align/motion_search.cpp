@@ -186,17 +186,17 @@ double MotionComparison::gain_of(const Displaced& displaced, int margin, int dx,
 std::vector<RatedMotion> MotionComparison::search(const SearchRange& range, int count, Executor& executor) const {
   // Half of the frame must stay; a rotation moves a corner by no more than half of the shorter side.
   const double step = turn_step(range);
-  const int most_x = static_cast<int>(std::min(range.max_shift_px, range.width / 2.0) / cell_px_ + 0.999);
-  const int most_y = static_cast<int>(std::min(range.max_shift_px, range.height / 2.0) / cell_px_ + 0.999);
+  const int max_x = static_cast<int>(std::min(range.max_shift_px, range.width / 2.0) / cell_px_ + 0.999);
+  const int max_y = static_cast<int>(std::min(range.max_shift_px, range.height / 2.0) / cell_px_ + 0.999);
   const double max_turn =
       std::min(range.max_turn_rad, std::min(range.width, range.height) / std::hypot(range.width, range.height));
-  const int turns = static_cast<int>(std::lround(max_turn / step)), margin = std::max(most_x, most_y);
+  const int turns = static_cast<int>(std::lround(max_turn / step)), margin = std::max(max_x, max_y);
   std::vector<std::vector<RatedMotion>> found(static_cast<std::size_t>(2 * turns + 1));
   for_each_index(executor, 2 * turns + 1, [&](int i) {
     const double turn = (i - turns) * step;
     const Displaced frame = displaced({0, 0, turn}, range, margin);
-    for (int dy = -most_y; dy <= most_y; ++dy) {
-      for (int dx = -most_x; dx <= most_x; ++dx) {
+    for (int dy = -max_y; dy <= max_y; ++dy) {
+      for (int dx = -max_x; dx <= max_x; ++dx) {
         const RigidMotion motion{static_cast<double>(cell_px_) * dx, static_cast<double>(cell_px_) * dy, turn};
         found[static_cast<std::size_t>(i)].push_back({motion, gain_of(frame, margin, dx, dy)});
       }
@@ -234,8 +234,8 @@ Plane<float> MotionComparison::losses(const RigidMotion& motion, const SearchRan
   return std::move(out.cells);
 }
 
-RatedMotion MotionComparison::smallest_of_best(const std::vector<RatedMotion>& motions,
-                                               const SearchRange& range) const {
+RatedMotion MotionComparison::smallest_near_best(const std::vector<RatedMotion>& motions,
+                                                 const SearchRange& range) const {
   const Plane<float> best = losses(motions.front().motion, range);
   RatedMotion out = motions.front();
   for (const RatedMotion& m : motions) {

@@ -71,7 +71,7 @@ class MotionComparison {
 
   /// Returns of several motions the first; of those that are not significantly worse (3 standard deviations of the sum
   /// of the cells' differences), the smallest: a periodic pattern matches in many places.
-  RatedMotion smallest_of_best(const std::vector<RatedMotion>& motions, const SearchRange& range) const;
+  RatedMotion smallest_near_best(const std::vector<RatedMotion>& motions, const SearchRange& range) const;
 
  private:
   /// The frame at displaced cells, and the part of its noise variance that interpolation has left, on average.

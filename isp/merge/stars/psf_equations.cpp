@@ -43,9 +43,9 @@ void ShapeEquations::add(const ColourSums& s, const ColourFit& fit) {
   const double f = fit.flux, b = fit.background;
   for (std::size_t i = 0; i < 3; ++i) {
     gradient[i] += f * (s.yd[i] - b * s.d[i] - f * s.ed[i]);
-    const double constant_share = s.one > 0 ? (s.d[i] - fit.share[i] * s.e) / s.one : 0;
+    const double constant_fraction = s.one > 0 ? (s.d[i] - fit.share[i] * s.e) / s.one : 0;
     for (std::size_t j = 0; j <= i; ++j) {
-      const double projected = fit.share[i] * s.ed[j] + constant_share * s.d[j];
+      const double projected = fit.share[i] * s.ed[j] + constant_fraction * s.d[j];
       normal[i][j] += f * f * (s.dd[i][j] - projected);
       normal[j][i] = normal[i][j];
     }

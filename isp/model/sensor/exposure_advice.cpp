@@ -29,7 +29,7 @@ double fullest_rate(const AdviceRequest& r, const GainSetting& gain, double lumi
 }
 
 SaturationLimits limits_of(const AdviceRequest& r, const SensorModel& sensor) {
-  return saturation_limits(sensor, normal_quantile_above(r.clipped_share));
+  return saturation_limits(sensor, normal_quantile_above(r.clipped_fraction));
 }
 
 struct Longest {
@@ -155,7 +155,7 @@ AdvicePoint predicted_point(const AdviceRequest& request, std::size_t gain, doub
     out.exceeds = ExposureLimit::full_well;
   }
   const double midtone_e = fullest_rate(request, setting, request.midtone_cd_m2) * exposure_s;
-  const double reachable_e = limits.least_e() * (1 + 1e-12);  // the limit, up to rounding
+  const double reachable_e = limits.min_e() * (1 + 1e-12);  // the limit, up to rounding
   if (midtone_e <= reachable_e) out.midtone = midtone_quality(request, setting, exposure_s);
   return out;
 }
@@ -166,7 +166,7 @@ Result<ExposureAdvice> advise_exposure(const AdviceRequest& request) {
   out.gains.reserve(request.gains.size());
   for (std::size_t i = 0; i < request.gains.size(); ++i) {
     const GainSetting& gain = request.gains[i];
-    if (!(limits_of(request, gain.sensor).least_e() > 0)) {
+    if (!(limits_of(request, gain.sensor).min_e() > 0)) {
       return fail(
           ErrorCode::invalid_argument,
           "noise alone clips more pixels than the fraction allowed; allow a larger fraction, or leave out this gain",
@@ -220,8 +220,8 @@ Result<void> check_light(const AdviceRequest& r) {
     return wrong("the highlight must be at least as bright as the mid tone of " + text_of(r.midtone_cd_m2) +
                  " cd/m2 and at most 1e12 cd/m2, found " + text_of(r.highlight_cd_m2));
   }
-  if (!(r.clipped_share >= 1e-9) || !(r.clipped_share <= 0.5)) {
-    return wrong("the fraction allowed to clip must be between 1e-9 and 0.5, found " + text_of(r.clipped_share));
+  if (!(r.clipped_fraction >= 1e-9) || !(r.clipped_fraction <= 0.5)) {
+    return wrong("the fraction allowed to clip must be between 1e-9 and 0.5, found " + text_of(r.clipped_fraction));
   }
   return {};
 }

@@ -25,7 +25,7 @@ struct AdviceRequest {
   Matrix3 camera_to_xyz{};         // for electrons; its scale does not matter
   double midtone_cd_m2 = 0;        // luminance at which signal-to-noise ratio and chromaticity are evaluated
   double highlight_cd_m2 = 0;      // luminance that must not clip
-  double clipped_share = 1e-3;     // fraction of pixels of the highlight that noise may clip, 1e-9..0.5
+  double clipped_fraction = 1e-3;  // fraction of pixels of the highlight that noise may clip, 1e-9..0.5
   double longest_exposure_s = 0;   // longest exposure without motion blur, see motion_limit_s
   double temperature_c = 20;       // temperature of the sensor
   double patch_pixels = 256;  // pixels of the patch whose chromaticity is evaluated: of R and of B, twice as many of G

@@ -13,7 +13,7 @@ namespace {
 constexpr double rounding = 1e-9;         // relative; of times that are computed twice
 constexpr double equal_snr = 0.005;       // gains whose ratio differs less are equally good
 constexpr double good_highlight = 0.015;  // charge by which a highlight may pass its limit meanwhile
-constexpr double least_e_per_s = 1e-6;    // keeps ratios of signal-to-noise ratios defined in the dark
+constexpr double min_e_per_s = 1e-6;      // keeps ratios of signal-to-noise ratios defined in the dark
 
 /// Returns the largest time of the camera's steps that is at most `time_s`, at least the first.
 double step_below(double time_s, const ExposureTimes& times) {
@@ -92,7 +92,7 @@ double dark_e_per_s(const GainStep& gain, const ExposureLimits& limits) {
 double midtone_snr(const ExposureSetting& setting, const MeteredLight& light, std::span<const GainStep> gains,
                    const ExposureLimits& limits) {
   const GainStep& gain = gains[setting.gain];
-  return snr(gain.sensor, {std::max(light.midtone_e_per_s, least_e_per_s) * setting.exposure_s,
+  return snr(gain.sensor, {std::max(light.midtone_e_per_s, min_e_per_s) * setting.exposure_s,
                            dark_e_per_s(gain, limits) * setting.exposure_s});
 }
 

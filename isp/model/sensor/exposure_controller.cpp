@@ -108,7 +108,7 @@ bool ExposureController::is_short(double exposure_s) const {
 }
 
 /// Returns whether a frame's highlight differs from that of the light by more than noise and flicker do.
-bool ExposureController::is_other_light(const Metered& frame, const GainStep& gain) const {
+bool ExposureController::is_changed_light(const Metered& frame, const GainStep& gain) const {
   if (!light_ || frame.clips) return true;
   const bool may_flicker = is_short(frame.exposure_s);
   if (may_flicker && peak_e_per_s_) return false;  // a darker frame is a trough unless 12 are dark
@@ -149,7 +149,7 @@ MeteredLight ExposureController::light_of_frames(bool may_flicker) {
 
 /// Returns whether the setting need not be left. One that has held for all frames of the mean is left only for one that
 /// a slightly brighter highlight allows as well.
-bool ExposureController::may_stay() const {
+bool ExposureController::may_keep_setting() const {
   const auto is_good_to = [&](const ExposureChoice& best, double tolerance) {
     return is_good(setting_, *light_, gains_, limits_, best, tolerance);
   };
@@ -186,7 +186,7 @@ std::optional<ExposureSetting> ExposureController::take(const MeteredCodes& code
   const StatedExposure exposed = stated.value_or(StatedExposure{setting_.exposure_s, gains_[setting_.gain].factor});
   Metered frame = metered(codes, exposed);
   const bool may_flicker = is_short(exposed.exposure_s);
-  const bool other = is_other_light(frame, gains_[gain_near(exposed.gain_factor)]);
+  const bool other = is_changed_light(frame, gains_[gain_near(exposed.gain_factor)]);
   follow_flicker(frame, other);
   if (other) count_ = 0;
   frames_[static_cast<std::size_t>(count_) % frames_.size()] = frame.light;
@@ -195,7 +195,7 @@ std::optional<ExposureSetting> ExposureController::take(const MeteredCodes& code
   if (!other && count_ < (may_flicker ? static_cast<int>(frames_.size()) : decisive_frames)) return std::nullopt;
   light_ = light_of_frames(may_flicker);
   choice_ = choice_of(peak_e_per_s_ && !frame.clips ? flicker_margin : 1);
-  if (may_stay()) {
+  if (may_keep_setting()) {
     settled_ = !frame.clips || choice_.clips;
     return std::nullopt;
   }

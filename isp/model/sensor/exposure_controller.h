@@ -81,9 +81,9 @@ class ExposureController {
   Metered metered(const MeteredCodes& codes, const StatedExposure& exposed) const;
   bool is_short(double exposure_s) const;
   void follow_flicker(Metered& frame, bool other);
-  bool is_other_light(const Metered& frame, const GainStep& gain) const;
+  bool is_changed_light(const Metered& frame, const GainStep& gain) const;
   MeteredLight light_of_frames(bool may_flicker);
-  bool may_stay() const;
+  bool may_keep_setting() const;
   ExposureChoice choice_of(double brightness) const;
 
   std::vector<GainStep> gains_;

@@ -86,9 +86,9 @@ MovedChange moved_change(const MovedLight& moved, const Contrast& contrast, int 
   const double change_e2 = std::fabs(moved.more_contrast_e2[c]) + unit_e * out.scatter_e +
                            variance * error * std::numbers::sqrt2 + std::hypot(by_added_e2, by_counts_e2);
   const double detail = contrast.variance_e2[c];
-  const double least_detail =
+  const double min_detail =
       std::max(0.0, detail - 2 * error * std::sqrt(detail * steady_e2 + contrast.by_signal_e3[c]));
-  const double seen = noise.variance_e2 * (1 - error * std::numbers::sqrt2) + least_detail;
+  const double seen = noise.variance_e2 * (1 - error * std::numbers::sqrt2) + min_detail;
   out.relative_variance = change_e2 / std::max(seen, noise.floor_e2);
   return out;
 }

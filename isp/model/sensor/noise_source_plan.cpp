@@ -58,8 +58,8 @@ bool present(const SensorModel& s, const Exposure& exposure, Effect effect) {
 double level_of(const BlockLevel& block) { return *std::max_element(block.signal_e.begin(), block.signal_e.end()); }
 
 /// Returns the decade of a level; levels below the least one share its decade, and so do those above 1e9.
-int decade_of(double level_e, double least_e) {
-  return static_cast<int>(std::floor(std::log10(std::clamp(level_e, least_e, 1e9))));
+int decade_of(double level_e, double min_e) {
+  return static_cast<int>(std::floor(std::log10(std::clamp(level_e, min_e, 1e9))));
 }
 
 /// Adds the members whose glow and whose moved light, relative to their noise, are extreme.

@@ -76,8 +76,8 @@ struct BlockLevel {
   Vector3 darkest_e{};  // signal of its darkest R, G and B pixels: a star's block is dark around it
   double peak_e = 0;    // signal of its brightest pixel, with or without the effects that move light
   struct Glow {
-    double mean_e = 0, least_e = 0, peak_e = 0;  // glow of its pixels
-    double variance_e2 = 0;                      // variance of the means of its pixels: the glow falls off
+    double mean_e = 0, min_e = 0, peak_e = 0;  // glow of its pixels
+    double variance_e2 = 0;                    // variance of the means of its pixels: the glow falls off
   } glow;
   Contrast contrast;  // 0 where no effect moves light
   MovedLight by_lens_blur, by_crosstalk, by_both;

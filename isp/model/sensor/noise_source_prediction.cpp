@@ -351,7 +351,7 @@ PredictedChange predict_change(const SensorModel& sensor, const Exposure& exposu
     return change_at(sensor, exposure, developing, signal_e, level, moved, kept);
   };
   BlockLevel darkest = block;
-  darkest.glow.mean_e = block.glow.least_e;
+  darkest.glow.mean_e = block.glow.min_e;
   PredictedChange out =
       larger(change(block.signal_e, block, no_light_moves), change(block.darkest_e, darkest, no_light_moves));
   if (const MovedLight moved = block.left_out(kept); moved.moves()) {

@@ -9,7 +9,7 @@ struct SaturationLimits {
   double full_well_e = 0;  // the pixels are full
   double converter_e = 0;  // the code is the largest
 
-  double least_e() const { return full_well_e < converter_e ? full_well_e : converter_e; }
+  double min_e() const { return full_well_e < converter_e ? full_well_e : converter_e; }
 };
 
 /// Returns z such that a standard normal variable exceeds it with this probability, in 0..1.

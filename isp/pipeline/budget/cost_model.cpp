@@ -93,9 +93,9 @@ double CostModel::seconds(CostPart part, const CostSize& size) const {
   return pace * (low.seconds + way * (high.seconds - low.seconds));
 }
 
-double predicted_s(const CostModel& model, const CostSize& size, const std::vector<CostShare>& work) {
+double predicted_s(const CostModel& model, const CostSize& size, const std::vector<CostTerm>& work) {
   double sum = 0;
-  for (const CostShare& part : work) sum += part.share * model.seconds(part.part, size);
+  for (const CostTerm& part : work) sum += part.share * model.seconds(part.part, size);
   return sum;
 }
 

@@ -92,13 +92,13 @@ struct CostModel {
 };
 
 /// Holds one part of a plan's work.
-struct CostShare {
+struct CostTerm {
   CostPart part;
   double share = 1;  // fraction of the frame
 };
 
 /// Returns the predicted time: the sum over parts.
-double predicted_s(const CostModel& model, const CostSize& size, const std::vector<CostShare>& work);
+double predicted_s(const CostModel& model, const CostSize& size, const std::vector<CostTerm>& work);
 
 inline constexpr std::string_view reference_machine = "two cores of an AMD EPYC with AVX-512";
 

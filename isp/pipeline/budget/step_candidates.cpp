@@ -44,14 +44,14 @@ CostPart part_of(DemosaicMethod method) {
 }
 
 /// Adds rendering with noise reduction.
-void add_level(const StepFacts& facts, Level level, std::vector<CostShare>& work) {
+void add_level(const StepFacts& facts, Level level, std::vector<CostTerm>& work) {
   for (int start = 0; start < 3; ++start) {
     const double share = facts.chroma.work[static_cast<std::size_t>(start)];
     if (share > 0) work.push_back({part_of(level, start), share});
   }
 }
 
-void add_output(const StepFacts& facts, const StepCandidate& plan, std::vector<CostShare>& work) {
+void add_output(const StepFacts& facts, const StepCandidate& plan, std::vector<CostTerm>& work) {
   if (facts.samples == SampleType::u16) work.push_back({CostPart::codes_16});
   if (facts.samples == SampleType::f32) work.push_back({CostPart::floats_32});
   if (facts.look) work.push_back({CostPart::look});
@@ -72,10 +72,10 @@ PixelRatios pixel_ratios(int planes) {
 
 /// Returns the work on a frame that is not a mosaic: its cells are denoised as a mosaic of four times as many sites,
 /// but not rendered as one.
-std::vector<CostShare> work_of_pixels(const StepFacts& facts, const StepCandidate& plan) {
+std::vector<CostTerm> work_of_pixels(const StepFacts& facts, const StepCandidate& plan) {
   constexpr double sites = 4;
   const PixelRatios ratio = pixel_ratios(facts.pixel_planes);
-  std::vector<CostShare> work{{CostPart::planning, ratio.planning}, {CostPart::floats, ratio.floats}};
+  std::vector<CostTerm> work{{CostPart::planning, ratio.planning}, {CostPart::floats, ratio.floats}};
   if (plan.level) {
     work.push_back({CostPart::check});
     work.push_back({CostPart::floats, ratio.check * facts.checked_fraction + ratio.cells - sites});
@@ -85,13 +85,13 @@ std::vector<CostShare> work_of_pixels(const StepFacts& facts, const StepCandidat
   return work;
 }
 
-std::vector<CostShare> work_of(const StepFacts& facts, const StepCandidate& plan) {
+std::vector<CostTerm> work_of(const StepFacts& facts, const StepCandidate& plan) {
   if (facts.pixel_planes > 0) return work_of_pixels(facts, plan);
-  std::vector<CostShare> work{{CostPart::planning}};
+  std::vector<CostTerm> work{{CostPart::planning}};
   if (facts.sizes.measured_fraction > 0) work.push_back({CostPart::samples, facts.sizes.measured_fraction});
   if (facts.may_search) work.push_back({CostPart::defects});
   if (plan.level) {
-    if (plan.lines && facts.may_take_lines) {
+    if (plan.lines && facts.may_subtract_lines) {
       work.push_back({CostPart::lines});
       const double size = facts.sizes.lines;
       if (size != 0) work.push_back({CostPart::offsets, std::isnan(size) ? fraction_of_unknown : 1});
@@ -186,17 +186,17 @@ Result<StepCandidate> within_budget(const StepFacts& facts, double budget_s) {
 
 }  // namespace
 
-LevelNoise level_noise(const std::vector<SeenBlock>& blocks) {
+LevelNoise level_noise(const std::vector<VisibilityBlock>& blocks) {
   std::vector<float> rms(blocks.size());
   const auto percentile = [&](const auto& delta_e) {
     std::ranges::transform(blocks, rms.begin(), delta_e);
-    return seen_percentile(rms);
+    return visible_percentile(rms);
   };
   const auto left_by = [&](std::optional<Level> level) {
-    return percentile([level](const SeenBlock& block) { return residual_delta_e(level, block); });
+    return percentile([level](const VisibilityBlock& block) { return residual_delta_e(level, block); });
   };
   LevelNoise out;
-  out.all = percentile([](const SeenBlock& block) { return block.noise_delta_e; });
+  out.all = percentile([](const VisibilityBlock& block) { return block.noise_delta_e; });
   out.without_level = left_by(std::nullopt);
   for (const Level level : {Level::draft, Level::standard}) out.left[static_cast<std::size_t>(level)] = left_by(level);
   return out;
@@ -210,7 +210,8 @@ void rate(const StepFacts& facts, StepCandidate& plan) {
     plan.left += std::isnan(size) ? std::numeric_limits<double>::infinity() : size;
     squares += std::pow(std::isnan(size) ? size_of_unknown : size, 2);
   };
-  if (facts.may_take_lines) leave(plan.lines && plan.level, facts.sizes.lines);  // subtracted with the noise, or kept
+  if (facts.may_subtract_lines)
+    leave(plan.lines && plan.level, facts.sizes.lines);  // subtracted with the noise, or kept
   leave(plan.dark || plan.level, facts.sizes.dark);
   leave(plan.display, facts.sizes.display);
   const auto demosaic = demosaic_of(facts, plan);

@@ -28,7 +28,7 @@ struct LevelNoise {
     return level ? left[static_cast<std::size_t>(*level)] : without_level;
   }
 };
-LevelNoise level_noise(const std::vector<SeenBlock>& blocks);
+LevelNoise level_noise(const std::vector<VisibilityBlock>& blocks);
 
 /// Describes one way to develop the frame.
 struct StepCandidate {
@@ -46,7 +46,7 @@ struct StepCandidate {
 struct StepFacts {
   const ProcessingGoal& choice;
   StepSizes sizes;
-  std::vector<SeenBlock> blocks;
+  std::vector<VisibilityBlock> blocks;
   bool noise_by_ratio = false;  // a frame that is not a mosaic: its level follows from its signal-to-noise ratio
   int pixel_planes = 0;         // planes of a frame that is not a mosaic, 1 or 3; 0 for mosaics
   double checked_fraction = 1;  // fraction of a frame that is checked, if it is not a mosaic: see pixel_noise.h
@@ -56,8 +56,8 @@ struct StepFacts {
   std::optional<denoise::Level> fixed_level;
   bool level_is_fixed = false;
   bool may_search = true;   // defects are searched for in the whole frame
-  std::size_t defects = 0;  // that are repaired
-  bool may_take_lines = true;
+  std::size_t defects = 0;  // number of repaired defects
+  bool may_subtract_lines = true;
   bool from_codes = false;  // can be rendered from codes unless reduction, repair or dark charge prevents it
   /// States how the missing colours of the frame would be interpolated with and without noise reduction, given time;
   /// absent where none are missing.

@@ -52,7 +52,7 @@ std::string region_words(const NoiseRegions& regions) {
                      have(std::nullopt), have(Level::draft), have(Level::standard), have(Level::high));
 }
 
-std::optional<double> cost_of(const StepFacts& facts, std::initializer_list<CostShare> parts) {
+std::optional<double> cost_of(const StepFacts& facts, std::initializer_list<CostTerm> parts) {
   if (!facts.choice.cost) return std::nullopt;
   return predicted_s(*facts.choice.cost, facts.size, parts);
 }
@@ -97,9 +97,9 @@ PlannedStep demosaic_step(const StepFacts& facts, StepCandidate plan) {
   return out;
 }
 
-std::string lines_words(const StepFacts& facts, const StepCandidate& plan) {
-  if (plan.lines && plan.level) return facts.sizes.lines_words;
-  const std::string measured = std::isfinite(facts.sizes.lines) ? facts.sizes.lines_words + "; " : std::string();
+std::string lines_text(const StepFacts& facts, const StepCandidate& plan) {
+  if (plan.lines && plan.level) return facts.sizes.lines_text;
+  const std::string measured = std::isfinite(facts.sizes.lines) ? facts.sizes.lines_text + "; " : std::string();
   return measured + (plan.level ? "" : "only subtracted with noise reduction, ") + reason_words(facts, plan);
 }
 
@@ -122,9 +122,9 @@ StepPlan told(const StepFacts& facts, const StepCandidate& plan) {
          fmt::format("{} repaired; the change is that of the strongest pixel", facts.defects),
          cost_of(facts, {{CostPart::defects}})});
   }
-  if (facts.may_take_lines) {
+  if (facts.may_subtract_lines) {
     const bool taken = plan.lines && plan.level;
-    add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken, lines_words(facts, plan),
+    add({"row and column noise", facts.sizes.lines, left(taken, facts.sizes.lines), taken, lines_text(facts, plan),
          cost_of_lines(facts, plan)});
   }
   if (facts.sizes.dark != 0) {
@@ -161,7 +161,7 @@ void set_pixel_noise(const RawFrame& frame, const Thumbnail& thumbnail, const De
                      const RawLevels& levels, const Rendering& rendering, StepFacts& facts, Executor& executor) {
   const std::optional<CellNoise> pixel = cell_noise(frame, levels, {1, 1, 1});
   if (!pixel) return;
-  facts.blocks = seen_blocks(frame, o, levels, rendering, pixel->noise, thumbnail, executor);
+  facts.blocks = visibility_blocks(frame, o, levels, rendering, pixel->noise, thumbnail, executor);
   facts.has_noise = !facts.blocks.empty();
   facts.chroma = chroma_work(frame, *cell_noise(frame, levels, parts_of(frame.raw)), thumbnail);
   if (facts.level_is_fixed || o.effects->all || o.effects->budget_s) return;
@@ -201,7 +201,7 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thum
     if (has_noise) set_pixel_noise(frame, thumbnail, o, levels, rendering, facts, executor);
   } else if (has_noise || (has_dark && levels.electrons_at_white)) {
     model = noise_model(frame, levels, rendering.white_gain);
-    facts.blocks = seen_blocks(frame, o, levels, rendering, model->noise, thumbnail, executor);
+    facts.blocks = visibility_blocks(frame, o, levels, rendering, model->noise, thumbnail, executor);
     facts.has_noise = has_noise && !facts.blocks.empty();
   }
   const bool of_mosaic = facts.has_noise && model;
@@ -209,7 +209,7 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thum
   if (facts.has_noise) facts.noise = level_noise(facts.blocks);
   facts.may_search = o.find_defects && is_mosaic(frame.raw);
   facts.defects = levels.defects.size();
-  facts.may_take_lines = of_mosaic && o.denoise.line_noise;
+  facts.may_subtract_lines = of_mosaic && o.denoise.line_noise;
   const double tolerance = o.effects->tolerance_delta_e.value_or(0);
   const bool noise_may_stay =
       !facts.level_is_fixed && facts.noise.left_by(std::nullopt) < fraction_for_level * tolerance;
@@ -219,7 +219,7 @@ StepFacts facts_of(const RawFrame& frame, const Thumbnail& thumbnail, const Thum
                             .light = light,
                             .noise = of_mosaic ? &median : nullptr,
                             .blocks = facts.blocks,
-                            .lines_may_stay = noise_may_stay && !o.effects->all},
+                            .lines_may_remain = noise_may_stay && !o.effects->all},
                            executor);
   RawLevels without_dark = levels;
   without_dark.black.dark_mean_e = {};

@@ -40,11 +40,11 @@ double excess_dn(const RawDn& raw, const Pixel& p) {
 }
 
 /// Returns the value that 5 % of the blocks exceed.
-double percentile_of(std::span<const SeenBlock> blocks, float SeenBlock::*figure) {
+double percentile_of(std::span<const VisibilityBlock> blocks, float VisibilityBlock::*figure) {
   if (blocks.empty()) return 0;
   std::vector<float> values;
   values.reserve(blocks.size());
-  for (const SeenBlock& block : blocks) values.push_back(block.*figure);
+  for (const VisibilityBlock& block : blocks) values.push_back(block.*figure);
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(seen_fraction * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return static_cast<double>(*at);
@@ -114,15 +114,15 @@ double line_std_e(std::span<const PlaneView<const float>> parts, denoise::Lines 
   mean.unevenness = 0;  // only whole lines show whether strong ones are noise
   mean.measured_std_e *= std::sqrt(part_length / (rows ? active.width : active.height));
   mean.gain = sum_e2 / (sum_e2 + measured * mean.measured_std_e * mean.measured_std_e);
-  return lines_stand_out(mean, noise) ? mean.line_std_e : 0;
+  return lines_are_visible(mean, noise) ? mean.line_std_e : 0;
 }
 
 void set_lines(const RawFrame& frame, const RawLevels& levels, const SizeRequest& request, StepSizes& out,
                Executor& executor) {
   const std::vector<Rect> squares = sample_squares(frame, levels);
-  if (squares.empty() && !request.lines_may_stay) {
+  if (squares.empty() && !request.lines_may_remain) {
     out.lines = nan;
-    out.lines_words = "searched in the whole frame";
+    out.lines_text = "searched in the whole frame";
     return;
   }
   const MeasuredCharge measured =
@@ -133,12 +133,12 @@ void set_lines(const RawFrame& frame, const RawLevels& levels, const SizeRequest
   const double line_e = std::hypot(rows_e, columns_e);
   std::vector<float> rms;
   rms.reserve(request.blocks.size());
-  for (const SeenBlock& block : request.blocks) rms.push_back(static_cast<float>(line_e) * block.line_delta_e);
-  out.lines = seen_percentile(rms);
+  for (const VisibilityBlock& block : request.blocks) rms.push_back(static_cast<float>(line_e) * block.line_delta_e);
+  out.lines = visible_percentile(rms);
   out.measured_fraction = static_cast<double>(measured.charge.value.size()) /
                           (static_cast<double>(active.width) * static_cast<double>(active.height));
-  out.lines_words = fmt::format("{:.2g} e- of rows and {:.2g} e- of columns in {:.0f} % of the frame", rows_e,
-                                columns_e, 100 * out.measured_fraction);
+  out.lines_text = fmt::format("{:.2g} e- of rows and {:.2g} e- of columns in {:.0f} % of the frame", rows_e, columns_e,
+                               100 * out.measured_fraction);
 }
 
 }  // namespace
@@ -147,9 +147,10 @@ StepSizes step_sizes(const RawFrame& frame, const DevelopOptions& options, const
                      const SizeRequest& request, Executor& executor) {
   StepSizes out;
   out.defects = size_of_defects(frame, options, levels, request);
-  if (options.display) out.display = request.noise ? percentile_of(request.blocks, &SeenBlock::display_delta_e) : nan;
+  if (options.display)
+    out.display = request.noise ? percentile_of(request.blocks, &VisibilityBlock::display_delta_e) : nan;
   if (levels.black.dark_mean_e != PerSite<double>{}) {
-    out.dark = request.blocks.empty() ? nan : percentile_of(request.blocks, &SeenBlock::dark_delta_e);
+    out.dark = request.blocks.empty() ? nan : percentile_of(request.blocks, &VisibilityBlock::dark_delta_e);
   }
   if (request.noise && options.denoise.line_noise) set_lines(frame, levels, request, out, executor);
   return out;

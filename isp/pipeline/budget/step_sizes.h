@@ -18,11 +18,11 @@ namespace lowlux::isp {
 /// means over 8 x 8 pixels would hide, all else as visible_noise.h measures it. Not a number where that is not known.
 struct StepSizes {
   double measured_fraction = 0;  // fraction of the frame that was searched for row and column noise
-  double defects = 0;            // of the strongest defect, in its pixel
-  double lines = 0;              // that 5 % of the places exceed, each averaged along its row and its column
-  std::string lines_words;
-  double dark = 0;     // of the mean dark charge that is known
-  double display = 0;  // of the change for a display; not a number where the noise is not known
+  double defects = 0;            // change by the strongest defect, in its pixel
+  double lines = 0;              // change that 5 % of the places exceed, averaged along rows and columns
+  std::string lines_text;
+  double dark = 0;     // change by the mean dark charge, if it is known
+  double display = 0;  // change for a display; NaN if the noise is not known
 };
 
 /// States what the predictions of step_sizes() are based on.
@@ -31,9 +31,9 @@ struct SizeRequest {
   const Thumbnail& light;  // dark charge subtracted
   /// States the noise of the frame, of its median block where it differs; null where it is not known.
   const denoise::RawNoise* noise = nullptr;
-  std::span<const SeenBlock> blocks;  // of the frame; none where the noise is not known
+  std::span<const VisibilityBlock> blocks;  // blocks of the frame; none where the noise is not known
   /// Row and column noise is measured in the whole frame where there is no sample, because a plan may leave it in.
-  bool lines_may_stay = false;
+  bool lines_may_remain = false;
 };
 
 /// Predicts what omitting each effect would change.

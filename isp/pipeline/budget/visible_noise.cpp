@@ -131,7 +131,7 @@ Channels channels_of(const RawFrame& frame, const RawLevels& levels, const denoi
       out.electrons_at_white[c] = 1 / frame.noise->scale[planes_of(frame.raw) == 3 ? c : 0];
     }
     out.light_at_white_e = out.electrons_at_white;
-    out.samples.fill(seen_box_px * seen_box_px);
+    out.samples.fill(visible_box_px * visible_box_px);
     out.is_grey = planes_of(frame.raw) == 1;
     return out;
   }
@@ -163,8 +163,8 @@ struct NoisyCharge {
   }
 };
 
-SeenBlock seen(const NoisyCharge& block, const Channels& channels, const denoise::RawNoise& noise,
-               const Display& display) {
+VisibilityBlock seen(const NoisyCharge& block, const Channels& channels, const denoise::RawNoise& noise,
+                     const Display& display) {
   const Vector3& charge_e = block.charge_e;
   Vector3 signal{};
   double mean_signal = 0, mean_variance = 0, squares = 0;
@@ -177,7 +177,7 @@ SeenBlock seen(const NoisyCharge& block, const Channels& channels, const denoise
   for (int c = 0; c < 3; ++c) lit[c] = std::max(signal[c], 0.0);
   const Lab lab = display.lab(lit);
   Vector3 with_dark = signal, with_line = lit;
-  const double line_e = std::sqrt(std::max(mean_variance, min_variance_e2) / (seen_box_px * seen_box_px));
+  const double line_e = std::sqrt(std::max(mean_variance, min_variance_e2) / (visible_box_px * visible_box_px));
   Vector3 pixel_std{};
   for (int c = 0; c < 3; ++c) {
     const double variance_e2 = block.variance_e2(c, noise);
@@ -191,7 +191,7 @@ SeenBlock seen(const NoisyCharge& block, const Channels& channels, const denoise
     with_dark[c] += channels.dark_e[c] / channels.light_at_white_e[c];
     with_line[c] += line_e / channels.light_at_white_e[c];
   }
-  SeenBlock out;
+  VisibilityBlock out;
   out.line_delta_e = static_cast<float>(ciede2000(lab, display.lab(with_line)) / line_e);
   out.display_delta_e = static_cast<float>(display.changed_for_display(signal));
   out.snr = static_cast<float>(std::max(mean_signal, 0.0) / std::sqrt(std::max(mean_variance, min_variance_e2)));
@@ -253,9 +253,10 @@ bool has_primaries(OutputSpace space) { return space != OutputSpace::camera && s
 
 }  // namespace
 
-std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& options, const RawLevels& levels,
-                                   const Rendering& rendering, const denoise::RawNoise& noise,
-                                   const Thumbnail& thumbnail, Executor& executor) {
+std::vector<VisibilityBlock> visibility_blocks(const RawFrame& frame, const DevelopOptions& options,
+                                               const RawLevels& levels, const Rendering& rendering,
+                                               const denoise::RawNoise& noise, const Thumbnail& thumbnail,
+                                               Executor& executor) {
   if (!has_primaries(options.space)) return {};
   const Display display(options, rendering);
   const Channels channels = channels_of(frame, levels, noise);
@@ -263,11 +264,11 @@ std::vector<SeenBlock> seen_blocks(const RawFrame& frame, const DevelopOptions& 
   const int along = std::min(columns, max_blocks_along), down = std::min(rows, max_blocks_along);
   const Charge charge(frame, thumbnail, channels, noise);
   const int reach = static_cast<int>(std::ceil(surroundings_px * columns / frame.raw.active.width));
-  std::vector<SeenBlock> out(static_cast<std::size_t>(along) * static_cast<std::size_t>(down));
+  std::vector<VisibilityBlock> out(static_cast<std::size_t>(along) * static_cast<std::size_t>(down));
   for_each_index(executor, down, [&](int j) {
     for (int i = 0; i < along; ++i) {
       const int x = (2 * i + 1) * columns / (2 * along), y = (2 * j + 1) * rows / (2 * down);
-      SeenBlock& block =
+      VisibilityBlock& block =
           out[static_cast<std::size_t>(j) * static_cast<std::size_t>(along) + static_cast<std::size_t>(i)];
       block = seen(charge.at(x, y), channels, noise, display);
       block.surroundings = static_cast<float>(charge.surroundings(x, y, reach));
@@ -299,7 +300,7 @@ std::optional<double> pixel_delta_e(const RawDn& raw, const DevelopOptions& opti
   return ciede2000(display.lab(around), display.lab(deviating));
 }
 
-double seen_percentile(std::span<const float> rms_delta_e) {
+double visible_percentile(std::span<const float> rms_delta_e) {
   const auto noisy = std::ranges::count_if(rms_delta_e, [](float rms) { return rms > 0; });
   if (static_cast<double>(noisy) <= (1 - seen_fraction) * static_cast<double>(rms_delta_e.size())) return 0;
   const auto fraction_above = [&](double x) {
@@ -331,7 +332,7 @@ double residual_noise_fraction(std::optional<denoise::Level> level, double snr) 
   return left.back();
 }
 
-float residual_delta_e(std::optional<denoise::Level> level, const SeenBlock& block) {
+float residual_delta_e(std::optional<denoise::Level> level, const VisibilityBlock& block) {
   const auto left = static_cast<float>(residual_noise_fraction(level, static_cast<double>(block.snr)));
   const float noise = left * block.surroundings * block.noise_delta_e;
   return level ? noise : std::hypot(noise, block.clip_delta_e);

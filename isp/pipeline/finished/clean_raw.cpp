@@ -92,7 +92,7 @@ Plane<float> interleaved(std::span<const Plane<float>> planes, const PerSite<dou
 SampleLevels levels_of(const RawDn& raw, const PixelCharge& charge, const Plane<float>& signal_e) {
   if (raw.is_float() && !raw.from_x_trans) return float_levels();
   if (raw.layout == SensorLayout::monochrome) return code_levels(charge.dark_noise);
-  return rgb_code_levels(charge.dark_noise, least_sample(signal_e, charge.at_white_e));
+  return rgb_code_levels(charge.dark_noise, min_sample(signal_e, charge.at_white_e));
 }
 
 void clean_pixels(const RawFrame& frame, CleanRaw& out, StageClock& clock, Executor& executor) {

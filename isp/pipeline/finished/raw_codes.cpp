@@ -11,11 +11,11 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double most_dn = 65535;
+constexpr double max_dn = 65535;
 
 std::uint16_t rounded(double dn, std::uint32_t word) {
   const double up = (static_cast<double>(word) + 0.5) / 4294967296.0;
-  return static_cast<std::uint16_t>(std::clamp(std::floor(dn + up), 0.0, most_dn));
+  return static_cast<std::uint16_t>(std::clamp(std::floor(dn + up), 0.0, max_dn));
 }
 
 /// Says which figures belong to a sample.
@@ -45,7 +45,7 @@ Plane<std::uint16_t> coded(const SignalToEncode& signal, const RawDn& like, cons
       for (int x = 0; x < out.width(); ++x) {
         const SampleIndex index = index_of(like, x, y);
         const double dn = levels.black_dn + signal.signal_e.at(x, y) * dn_per_e[index.site];
-        out.at(x, y) = is_saturated(signal, index, x, y) ? static_cast<std::uint16_t>(most_dn) : rounded(dn, words[x]);
+        out.at(x, y) = is_saturated(signal, index, x, y) ? static_cast<std::uint16_t>(max_dn) : rounded(dn, words[x]);
       }
     }
   });
@@ -70,19 +70,19 @@ Plane<float> fractions(const SignalToEncode& signal, const RawDn& like, Executor
 }  // namespace
 
 SampleLevels code_levels(double dark_noise) {
-  const double wanted = 8 * dark_noise / (1 + 8 * dark_noise) * most_dn;
+  const double wanted = 8 * dark_noise / (1 + 8 * dark_noise) * max_dn;
   const double black_dn = std::clamp(256 * std::ceil(wanted / 256), 1024.0, 16384.0);
-  return {.black_dn = black_dn, .range_dn = most_dn - black_dn};
+  return {.black_dn = black_dn, .range_dn = max_dn - black_dn};
 }
 
-SampleLevels rgb_code_levels(double dark_noise, double least_sample) {
-  const double below = std::clamp(-least_sample, 0.0, 1.0);
-  const double wanted = below / (1 + below) * most_dn;
+SampleLevels rgb_code_levels(double dark_noise, double min_sample) {
+  const double below = std::clamp(-min_sample, 0.0, 1.0);
+  const double wanted = below / (1 + below) * max_dn;
   const double black_dn = std::clamp(16 * std::ceil(wanted / 16), 16.0, code_levels(dark_noise).black_dn);
-  return {.black_dn = black_dn, .range_dn = most_dn - black_dn};
+  return {.black_dn = black_dn, .range_dn = max_dn - black_dn};
 }
 
-double least_sample(const Plane<float>& samples_e, const PerSite<double>& at_white_e) {
+double min_sample(const Plane<float>& samples_e, const PerSite<double>& at_white_e) {
   std::array<float, 3> least{};
   for (int y = 0; y < samples_e.height(); ++y) {
     const float* const row = samples_e.row(y);

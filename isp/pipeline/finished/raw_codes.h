@@ -27,11 +27,11 @@ SampleLevels code_levels(double dark_noise);
 /// Returns levels of 16-bit codes for images of three samples: black is as small as negative samples allow, a multiple
 /// of 16 from 16 on, and at most that of code_levels. darktable and others do not subtract the black level of such
 /// images, and RawTherapee and others do not read floating-point ones.
-/// @param least_sample  the smallest sample, in fractions of white
-SampleLevels rgb_code_levels(double dark_noise, double least_sample);
+/// @param min_sample  the smallest sample, in fractions of white
+SampleLevels rgb_code_levels(double dark_noise, double min_sample);
 
 /// Returns the smallest sample of an image of interleaved R, G and B, in fractions of white; 0 if none is negative.
-double least_sample(const Plane<float>& samples_e, const PerSite<double>& at_white_e);
+double min_sample(const Plane<float>& samples_e, const PerSite<double>& at_white_e);
 
 /// Returns the levels of floating-point samples, DNG's defaults for them.
 inline SampleLevels float_levels() { return {.is_float = true}; }

@@ -16,9 +16,9 @@ namespace {
 constexpr double highest_code = 65535;
 
 double fraction_of_held(const Encoded16& picture, const RetargetMap& map) {
-  constexpr std::size_t most_pixels = 4096;
+  constexpr std::size_t max_pixels = 4096;
   const std::size_t pixels = picture.codes.size() / 3;
-  const std::size_t asked = std::min(most_pixels, pixels);
+  const std::size_t asked = std::min(max_pixels, pixels);
   std::size_t held = 0;
   for (std::size_t i = 0; i < asked; ++i) {
     const std::uint16_t* rgb = picture.codes.data() + 3 * (i * pixels / asked);
@@ -64,7 +64,7 @@ Result<RetargetedPicture> retarget_picture(const SceneLinear& xyz, const Retarge
   RetargetedPicture out;
   out.levels = made.table.levels;
   out.error = made.error;
-  out.fraction_held = fraction_of_held(in, *map);
+  out.fraction_outside_gamut = fraction_of_held(in, *map);
   if (samples == SampleType::u8) {
     out.picture = looked_up_codes<std::uint8_t>(made.table, in, executor);
   } else {

@@ -10,10 +10,10 @@ namespace lowlux::isp {
 
 /// Holds an image for another display.
 struct RetargetedPicture {
-  Picture picture;           // sRGB codes, or floats of linear sRGB
-  int levels = 0;            // levels of the table, along each axis
-  TableError error;          // error of the table
-  double fraction_held = 0;  // fraction of up to 4096 evenly spread pixels whose match the display cannot show
+  Picture picture;                    // sRGB codes, or floats of linear sRGB
+  int levels = 0;                     // levels of the table, along each axis
+  TableError error;                   // error of the table
+  double fraction_outside_gamut = 0;  // fraction of up to 4096 evenly spread pixels whose match the display cannot show
 };
 
 /// Maps an image through another map of colours, by way of 16-bit sRGB codes and a table.

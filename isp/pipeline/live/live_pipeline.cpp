@@ -11,7 +11,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int most_side = 65536;
+constexpr int max_side = 65536;
 
 bool inside(const Rect& r, int width, int height) {
   return r.x >= 0 && r.y >= 0 && r.width >= 0 && r.height >= 0 && r.x <= width - r.width && r.y <= height - r.height;
@@ -20,8 +20,8 @@ bool inside(const Rect& r, int width, int height) {
 Result<void> check(const LiveSetup& setup) {
   const auto wrong = [](std::string message) { return fail(ErrorCode::invalid_argument, std::move(message)); };
   if (names_of(setup.format) == nullptr) return fail(ErrorCode::unsupported, "the raw format is not known");
-  if (setup.width < 2 || setup.height < 2 || setup.width > most_side || setup.height > most_side) {
-    return wrong(fmt::format("width and height of frames must be 2 to {} pixels, found {} x {}", most_side, setup.width,
+  if (setup.width < 2 || setup.height < 2 || setup.width > max_side || setup.height > max_side) {
+    return wrong(fmt::format("width and height of frames must be 2 to {} pixels, found {} x {}", max_side, setup.width,
                              setup.height));
   }
   if (!inside(setup.active, setup.width, setup.height) || setup.active.width < 2 || setup.active.height < 2) {

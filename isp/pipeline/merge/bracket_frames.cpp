@@ -27,8 +27,8 @@ Plane<float> BracketFrames::remove_saturated(FrameElectrons& frame) const {
 void BracketFrames::begin(FrameElectrons& reference) {
   reference_saturated_ = remove_saturated(reference);
   saturated_ = reference_saturated_.clone();
-  least_e_ = reference.signal_e.clone();
-  least_matches_ = {};
+  min_e_ = reference.signal_e.clone();
+  min_matches_ = {};
   least_light_ = 1;
   is_aligned_ = true;
   variance_e2_ = reference.variance_e2;
@@ -60,7 +60,7 @@ bool BracketFrames::add(const FrameElectrons& frame, double light, const Plane<f
   is_aligned_ = motion.found;
   variance_e2_ = frame.variance_e2;
   merge::place_nearest(saturated.view(), frame.phase, motion, {}, saturated_.view(), executor_);
-  merge::place_nearest(frame.signal_e.view(), frame.phase, motion, {}, least_e_.view(), executor_);
+  merge::place_nearest(frame.signal_e.view(), frame.phase, motion, {}, min_e_.view(), executor_);
   return true;
 }
 
@@ -74,18 +74,18 @@ bool BracketFrames::lacks_values(const merge::MosaicMean& mean, const Rect& bloc
 }
 
 bool BracketFrames::is_missing(const merge::MosaicMean& mean, int x, int y) const {
-  return !(mean.weight().at(x, y) > 0) && !std::isnan(least_e_.at(x, y));
+  return !(mean.weight().at(x, y) > 0) && !std::isnan(min_e_.at(x, y));
 }
 
 void BracketFrames::fill_block(merge::MosaicMean& mean, const Rect& block) {
   const bool matches =
-      least_matches_.empty() || least_matches_.at(block.x / merge::block_px, block.y / merge::block_px) != 0;
+      min_matches_.empty() || min_matches_.at(block.x / merge::block_px, block.y / merge::block_px) != 0;
   const bool replaces = !matches && lacks_values(mean, block);
   const auto light = static_cast<float>(least_light_);
   for (int y = block.y; y < block.y + block.height; ++y) {
     for (int x = block.x; x < block.x + block.width; ++x) {
       const bool is_outside = std::isnan(saturated_.at(x, y));
-      const float e = least_e_.at(x, y);
+      const float e = min_e_.at(x, y);
       if (!std::isnan(e) && (replaces || (matches && is_missing(mean, x, y)))) {
         const float variance_e2 = std::max(e, 0.0F) + static_cast<float>(variance_e2_[site_of(x, y)]);
         mean.replace(x, y, e / light, light * light / std::max(variance_e2, 1e-6F));

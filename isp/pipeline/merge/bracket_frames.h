@@ -34,7 +34,7 @@ class BracketFrames {
   /// the first of them whose displacement was found. @return whether it is kept
   bool add(const FrameElectrons& frame, double light, const Plane<float>& saturated, const merge::Motion& motion);
   /// States where the frame that was kept last matches the reference, as Comparison has it; empty: everywhere.
-  void set_matches(Plane<std::uint8_t> block_matches) { least_matches_ = std::move(block_matches); }
+  void set_matches(Plane<std::uint8_t> block_matches) { min_matches_ = std::move(block_matches); }
 
   /// Fills sites without a value by those of the frame of least light. Where that frame does not match the reference,
   /// because something moved, blocks in which the reference is saturated are replaced: all of their sites then show the
@@ -54,10 +54,10 @@ class BracketFrames {
 
   int width_, height_;
   Executor& executor_;
-  Plane<float> reference_saturated_;   // 1 where it is, else 0
-  Plane<float> saturated_;             // see saturated()
-  Plane<float> least_e_;               // values of the frame of least light, in its own light; NaN where it has none
-  Plane<std::uint8_t> least_matches_;  // blocks
+  Plane<float> reference_saturated_;  // 1 where it is, else 0
+  Plane<float> saturated_;            // see saturated()
+  Plane<float> min_e_;                // values of the frame of least light, in its own light; NaN where it has none
+  Plane<std::uint8_t> min_matches_;   // blocks
   double least_light_ = 1;
   bool is_aligned_ = true;         // the displacement of that frame is known
   PerSite<double> variance_e2_{};  // variance of that frame without light

@@ -128,8 +128,7 @@ void encode_drizzled(merge::DrizzleImage& image, const merge::DrizzleOptions& op
   out.empty_fraction = image.empty_fraction;
   const Plane<float> samples = interleaved(image, prediction, executor);
   const PerSite<double>& site_white_e = reference.light_at_white_e;
-  const SampleLevels codes =
-      rgb_code_levels(dark_noise(reference, site_white_e), least_sample(samples, colours.white_e));
+  const SampleLevels codes = rgb_code_levels(dark_noise(reference, site_white_e), min_sample(samples, colours.white_e));
   const SampleLevels levels = fine_levels(codes, reference, site_white_e, out);
   for (double& offset : out.frame.noise->offset) offset += levels.rounding_variance();
   image = {};

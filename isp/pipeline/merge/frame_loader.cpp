@@ -17,7 +17,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double max_noise_ratio = 1.2;  // of the variance of frames of one ISO
-constexpr double most_saturated = 0.5;   // share of the sites of a reference
+constexpr double max_saturated = 0.5;    // share of the sites of a reference
 constexpr int counted_rows = 8;          // of so many, two are counted
 
 bool differ(const std::optional<double>& a, const std::optional<double>& b) {
@@ -71,7 +71,7 @@ std::optional<SaturationLevel> saturation_of(const FrameToMerge& to) {
 }
 
 /// Returns the share of saturated sites, of some rows.
-double saturated_share(const RawDn& raw, const std::optional<SaturationLevel>& level) {
+double saturated_fraction(const RawDn& raw, const std::optional<SaturationLevel>& level) {
   PerSite<double> limit_dn{};
   for (int site = 0; site < 4; ++site) limit_dn[site] = saturated_fraction_of_white * white_at(raw, site);
   if (level) limit_dn.fill(level->from_dn());
@@ -193,7 +193,7 @@ Result<int> FrameLoader::brightest(int count) {
   if (next_.valid()) next_.wait();  // frames are read one at a time
   surveyed_.clear();
   int found = 0;
-  double most_light = -1;
+  double max_light = -1;
   std::vector<FrameSaturation> surveyed;
   for (int index = 0; index < count; ++index) {
     Result<FrameToMerge> read = read_(index, false);
@@ -203,11 +203,11 @@ Result<int> FrameLoader::brightest(int count) {
     if (!raw.info.exposure_s) return 0;
     surveyed.push_back({raw.info.iso, saturation_of(*read)});
     const double light = *raw.info.exposure_s / std::pow(raw.info.f_number.value_or(1), 2);
-    const bool is_brighter = light > most_light && saturated_share(raw, surveyed.back().level) <= most_saturated;
+    const bool is_brighter = light > max_light && saturated_fraction(raw, surveyed.back().level) <= max_saturated;
     clock_.lap("black and noise");
     if (!is_brighter) continue;
     found = index;
-    most_light = light;
+    max_light = light;
   }
   surveyed_ = std::move(surveyed);
   return found;

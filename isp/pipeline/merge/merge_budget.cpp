@@ -11,7 +11,7 @@ namespace {
 
 constexpr int first_mean = 8;              // frames, of which the reference is predicted first
 constexpr int last_mean = 256;             // merge::ColourMean holds no more frames
-constexpr double colours_share = 0.4;      // of the time of placing a frame: adding it to the mean of all colours
+constexpr double colour_fraction = 0.4;    // of the time of placing a frame: adding it to the mean of all colours
 constexpr double colour_prediction = 4.5;  // times the first prediction: developing all colours at every pixel
 constexpr int motion_frames = 2;           // in which the motion of the camera is measured
 
@@ -59,7 +59,7 @@ int frames_of_colours(int frames) {
 
 /// Returns the time of the robust mean of so many frames over that of sampled_frames. Most of it is the comparison with
 /// the reference frame, which takes as long for any number.
-double robust_share(int frames) {
+double robust_fraction(int frames) {
   constexpr double compared = 3;  // frames whose mean takes as long as the comparison
   return (compared + frames) / (compared + sampled_frames);
 }
@@ -94,14 +94,14 @@ double predicted_merge_s(const CostModel& cost, const MergeWork& work, const Mer
   const int n = work.frames;
   const int sampled = std::min(n, sampled_frames);
   const bool compares = method.robust && n > 1;
-  std::vector<CostShare> parts{{CostPart::merge_codes}};
+  std::vector<CostTerm> parts{{CostPart::merge_codes}};
   const auto add = [&](CostPart part, double times) { parts.push_back({part, times}); };
   const int measured = motion_measured ? std::min(motion_frames, n - 1) : 0;
   if (is_static(method.alignment)) {
     add(CostPart::merge_alignment, measured);
     add(CostPart::merge_frame, 1 + n + measured + (compares ? sampled - 1 : 0));
     add(CostPart::merge_mean, n);
-    if (compares) add(CostPart::merge_robust, robust_share(sampled));
+    if (compares) add(CostPart::merge_robust, robust_fraction(sampled));
     if (compares) add(CostPart::merge_comparison, n);
     return predicted_s(cost, work.size, parts);
   }
@@ -113,7 +113,7 @@ double predicted_merge_s(const CostModel& cost, const MergeWork& work, const Mer
   if (cells) {
     add(CostPart::merge_cells, n - 1);
   } else {
-    add(CostPart::merge_subpixel, n - 1 + colours_share * frames_of_colours(n));
+    add(CostPart::merge_subpixel, n - 1 + colour_fraction * frames_of_colours(n));
     add(CostPart::merge_prediction, 1 + colour_prediction * predictions_of_mean(n));
   }
   return predicted_s(cost, work.size, parts);

@@ -24,13 +24,13 @@ std::size_t colour_of(BayerPhase phase, int site) {
 }
 
 /// Returns the smallest variance of a site without light, in fractions of white squared.
-double least_dark_variance(const FrameElectrons& reference, const PerSite<double>& site_white_e,
-                           const MergedRaw& merged) {
-  double most_light = 1;
-  for (const FrameUse& use : merged.frames) most_light = std::max(most_light, use.light);
+double min_dark_variance(const FrameElectrons& reference, const PerSite<double>& site_white_e,
+                         const MergedRaw& merged) {
+  double max_light = 1;
+  for (const FrameUse& use : merged.frames) max_light = std::max(max_light, use.light);
   double least = std::numeric_limits<double>::infinity();
   for (int site = 0; site < 4; ++site) {
-    const double one = reference.variance_e2[site] / std::pow(most_light * site_white_e[site], 2);
+    const double one = reference.variance_e2[site] / std::pow(max_light * site_white_e[site], 2);
     least = std::min(least, one / static_cast<double>(merged.frames.size()));
   }
   return least;
@@ -49,7 +49,7 @@ double dark_noise(const FrameElectrons& reference, const PerSite<double>& site_w
 
 SampleLevels fine_levels(const SampleLevels& codes, const FrameElectrons& reference,
                          const PerSite<double>& site_white_e, const MergedRaw& merged) {
-  const bool fine = codes.rounding_variance() < max_rounding * least_dark_variance(reference, site_white_e, merged);
+  const bool fine = codes.rounding_variance() < max_rounding * min_dark_variance(reference, site_white_e, merged);
   return fine ? codes : float_levels();
 }
 

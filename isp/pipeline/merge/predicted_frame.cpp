@@ -20,7 +20,7 @@ namespace {
 constexpr std::int64_t max_whole_mean_px = 10'000'000;
 constexpr std::int64_t strip_px = 4'000'000;
 constexpr int strip_margin_px = 64;  // above and below, as tiles with levels up to standard have it in cells
-constexpr int least_strip_rows = 128;
+constexpr int min_strip_rows = 128;
 
 /// Returns the description of a frame whose image is its whole active area, without gains. The samples are borrowed
 /// from `frame` and have to be given back.
@@ -47,19 +47,19 @@ Result<CameraRgb> predicted(RawFrame& frame, const DevelopOptions& options, cons
                             Executor& executor) {
   const Rect crop = frame.raw.default_crop;
   RawFrame whole = whole_area(frame);
-  const auto give_back = [&] {
+  const auto return_buffer = [&] {
     frame.raw = std::move(whole.raw);
     frame.raw.default_crop = crop;
   };
   RawElectrons charge;
   Result<DevelopPlan> plan = plan_develop(whole, options_of_signal(options, way.level), executor, &charge);
   if (!plan) {
-    give_back();
+    return_buffer();
     return tl::make_unexpected(std::move(plan.error()));
   }
   Picture picture = make_picture(*plan);
   Pipeline(executor, way.limits).render(whole, *plan, picture, std::move(charge));
-  give_back();
+  return_buffer();
   CameraRgb out;
   out.plane = std::move(std::get<SceneLinear>(picture).plane);
   const std::array<double, 3> light_e = way.white_e ? *way.white_e : light_at_white_by_colour(frame.raw, plan->levels);
@@ -93,7 +93,7 @@ std::array<double, 3> white_of(const ColourLevels& levels) {
 /// Returns the rows of a strip without its margins, a multiple of these.
 int strip_rows(int width) {
   const auto rows = static_cast<int>(strip_px / width) - 2 * strip_margin_px;
-  return std::max(rows - rows % strip_margin_px, least_strip_rows);
+  return std::max(rows - rows % strip_margin_px, min_strip_rows);
 }
 
 }  // namespace

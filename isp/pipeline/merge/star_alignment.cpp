@@ -10,18 +10,18 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int least_stars = 4;           // that state a transformation which chance does not explain
+constexpr int min_stars = 4;             // that state a transformation which chance does not explain
 constexpr double max_star_error_px = 1;  // standard error of a displacement
 
 }  // namespace
 
 Result<StarAlignment> StarAlignment::of(const merge::FrameView& reference, Executor& executor) {
   merge::StarField field = merge::find_stars(reference, {}, executor);
-  if (static_cast<int>(field.stars.size()) < least_stars) {
+  if (static_cast<int>(field.stars.size()) < min_stars) {
     return fail(ErrorCode::insufficient,
                 fmt::format("{} stars were found, and at least {} are needed; choose another reference, or align by "
                             "the detail of the scene",
-                            field.stars.size(), least_stars));
+                            field.stars.size(), min_stars));
   }
   return StarAlignment(std::move(field));
 }

@@ -20,7 +20,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int most_sample_px = 2048;
+constexpr int max_sample_px = 2048;
 
 /// Returns the black level of a colour [DN]; that of a monochrome frame is the mean over its sites.
 double black_dn_of(const RawFrame& frame, const RawLevels& levels, std::size_t colour) {
@@ -47,7 +47,7 @@ std::vector<Rect> checked_parts(const RawFrame& frame, const RawLevels& levels) 
   std::vector<Rect> squares = sample_squares(frame, levels);
   if (!squares.empty()) return squares;
   const Rect& active = frame.raw.active;
-  const int width = std::min(active.width, most_sample_px), height = std::min(active.height, most_sample_px);
+  const int width = std::min(active.width, max_sample_px), height = std::min(active.height, max_sample_px);
   return {{(active.width - width) / 2 & ~1, (active.height - height) / 2 & ~1, width, height}};
 }
 

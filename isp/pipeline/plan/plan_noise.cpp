@@ -88,7 +88,7 @@ double pixel_std_e(const denoise::RawNoise& noise, double snr) {
 /// Returns the warning of lines that are too strong to be taken for noise, where they are visible above that of the
 /// median pixel; empty for others.
 std::string warning_of_strong_lines(const denoise::LineOffsets& found, const denoise::RawNoise& noise, double snr) {
-  if (found.gain < 0.5 || lines_stand_out(found, noise)) return {};
+  if (found.gain < 0.5 || lines_are_visible(found, noise)) return {};
   if (found.line_std_e < min_strong_lines * pixel_std_e(noise, snr)) return {};
   return fmt::format(
       "{} have offsets of {:.3g} e-, more than the read noise, and are not corrected, because they may be part of the "
@@ -109,7 +109,7 @@ std::vector<denoise::LineOffsets> lines_of(const denoise::RawNoise& noise, doubl
     if (!found) continue;
     std::string warning = warning_of_strong_lines(*found, noise, snr);
     if (!warning.empty()) warnings.push_back(std::move(warning));
-    if (lines_stand_out(*found, noise)) lines.push_back(*std::move(found));
+    if (lines_are_visible(*found, noise)) lines.push_back(*std::move(found));
   }
   return lines;
 }
@@ -175,7 +175,7 @@ bool is_denoised_before(const RawFrame& frame, const DenoiseChoice& choice) {
   return choice.mode == DenoiseChoice::Mode::automatic && !choice.always && frame.noise && frame.noise->reduced;
 }
 
-bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise) {
+bool lines_are_visible(const denoise::LineOffsets& found, const denoise::RawNoise& noise) {
   if (found.gain < 0.5 || !(found.line_std_e > min_line_std_e(noise))) return false;
   return found.line_std_e < black_std_e(noise) || found.unevenness < max_unevenness;
 }

@@ -27,7 +27,7 @@ bool is_denoised_before(const RawFrame& frame, const DenoiseChoice& choice);
 /// measurement, and more than 3 % of a pixel's noise, as the eye integrates it along a line. Lines that differ by more
 /// than a pixel's noise without light are taken for scene structure, such as a blind or a fence, unless the offset is
 /// the same in both colours of a line and all along it.
-bool lines_stand_out(const denoise::LineOffsets& found, const denoise::RawNoise& noise);
+bool lines_are_visible(const denoise::LineOffsets& found, const denoise::RawNoise& noise);
 
 /// Decides how noise is reduced. Errors for a requested level: those of noise_obstacle. For an automatic level these
 /// are reasons to leave the noise.

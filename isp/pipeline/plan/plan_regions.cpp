@@ -21,14 +21,14 @@ double work_of(std::optional<Level> level) {
   return level ? work[static_cast<std::size_t>(*level)] : 0.05;
 }
 
-std::optional<Level> cheapest(const std::vector<SeenBlock>& blocks, Level most, double tolerance_delta_e) {
+std::optional<Level> cheapest(const std::vector<VisibilityBlock>& blocks, Level most, double tolerance_delta_e) {
   for (const std::optional<Level> level : {std::optional<Level>(), std::optional(Level::draft),
                                            std::optional(Level::standard), std::optional(Level::high)}) {
     if (level && *level >= most) break;
     std::vector<float> rms;
     rms.reserve(blocks.size());
-    for (const SeenBlock& block : blocks) rms.push_back(residual_delta_e(level, block));
-    if (seen_percentile(rms) < tolerance_delta_e) return level;
+    for (const VisibilityBlock& block : blocks) rms.push_back(residual_delta_e(level, block));
+    if (visible_percentile(rms) < tolerance_delta_e) return level;
   }
   return most;
 }
@@ -38,7 +38,7 @@ double work_of_parts(const NoiseRegions& regions, const Rect& active, Level most
   how.level = most;
   how.regions = regions;
   std::vector<LevelPart> parts;
-  cut_by_level(how, {0, 0, active.width, active.height}, TileLimits{}.side_px, parts);
+  split_by_level(how, {0, 0, active.width, active.height}, TileLimits{}.side_px, parts);
   double sum = 0;
   for (const LevelPart& part : parts) {
     const Rect whole =
@@ -50,21 +50,21 @@ double work_of_parts(const NoiseRegions& regions, const Rect& active, Level most
 
 }  // namespace
 
-std::optional<NoiseRegions> plan_regions(const Rect& active, const std::vector<SeenBlock>& blocks, Level most,
+std::optional<NoiseRegions> plan_regions(const Rect& active, const std::vector<VisibilityBlock>& blocks, Level most,
                                          double tolerance_delta_e) {
   const auto count = [](int size) { return (size + region_px - 1) / region_px; };
   NoiseRegions out{region_px, count(active.width), count(active.height), {}};
   const auto regions = static_cast<std::size_t>(out.columns) * static_cast<std::size_t>(out.rows);
   if (regions < 2) return std::nullopt;
-  std::vector<std::vector<SeenBlock>> in_region(regions);
-  for (const SeenBlock& block : blocks) {
+  std::vector<std::vector<VisibilityBlock>> in_region(regions);
+  for (const VisibilityBlock& block : blocks) {
     const int x = static_cast<int>(block.x * static_cast<float>(active.width)) / region_px;
     const int y = static_cast<int>(block.y * static_cast<float>(active.height)) / region_px;
     in_region[static_cast<std::size_t>(y) * static_cast<std::size_t>(out.columns) + static_cast<std::size_t>(x)]
         .push_back(block);
   }
   out.level.reserve(regions);
-  for (const std::vector<SeenBlock>& region : in_region) {
+  for (const std::vector<VisibilityBlock>& region : in_region) {
     out.level.push_back(region.empty() ? std::optional(most) : cheapest(region, most, tolerance_delta_e));
   }
   const double whole = work_of(most) * active.width * active.height;

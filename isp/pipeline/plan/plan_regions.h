@@ -16,7 +16,7 @@ inline constexpr int region_px = 1024;  // side of a region
 /// time, as estimated from the levels' usual times and the margins of the tiles, or where the frame is one region.
 /// @param active  active of the frame
 /// @param most    level of the frame as a whole
-std::optional<NoiseRegions> plan_regions(const Rect& active, const std::vector<SeenBlock>& blocks, denoise::Level most,
-                                         double tolerance_delta_e);
+std::optional<NoiseRegions> plan_regions(const Rect& active, const std::vector<VisibilityBlock>& blocks,
+                                         denoise::Level most, double tolerance_delta_e);
 
 }  // namespace lowlux::isp

@@ -94,7 +94,7 @@ void fill(const PlaneView<float>& map, const Rect& cells, double value) {
 
 }  // namespace
 
-void cut_by_level(const NoiseReduction& how, const Rect& core, int side, std::vector<LevelPart>& parts) {
+void split_by_level(const NoiseReduction& how, const Rect& core, int side, std::vector<LevelPart>& parts) {
   parts.clear();
   if (!how.regions) return parts.push_back({core, how.level});
   const NoiseRegions& regions = *how.regions;
@@ -121,8 +121,8 @@ denoise::Level max_level_of(const NoiseReduction& how) {
   return most;
 }
 
-void take_dark_off(PlaneView<const float> raw_e, const denoise::RawNoise& noise, PlaneView<float> signal_e,
-                   Executor& executor) {
+void subtract_dark_charge(PlaneView<const float> raw_e, const denoise::RawNoise& noise, PlaneView<float> signal_e,
+                          Executor& executor) {
   for_each_band(executor, raw_e.height, [&](RowBand band, int) {
     for (int y = band.first; y < band.last; ++y) {
       const int left = site_of(0, y);

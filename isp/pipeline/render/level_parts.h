@@ -19,15 +19,15 @@ struct LevelPart {
 /// Splits `core` into tiles of one level each. Regions of one level are joined to rectangles, up to `side` pixels each
 /// way, which saves their margins; all of `core` is one tile where it has one level, however large it is.
 /// @param parts  cleared; grows to the number of tiles
-void cut_by_level(const NoiseReduction& how, const Rect& core, int side, std::vector<LevelPart>& parts);
+void split_by_level(const NoiseReduction& how, const Rect& core, int side, std::vector<LevelPart>& parts);
 
 /// Returns the highest level of any region of the frame. Precondition: how.has_level().
 denoise::Level max_level_of(const NoiseReduction& how);
 
 /// Subtracts dark charge from a tile whose noise stays.
 /// @param raw_e  its corner at an even column and row of the active area
-void take_dark_off(PlaneView<const float> raw_e, const denoise::RawNoise& noise, PlaneView<float> signal_e,
-                   Executor& executor);
+void subtract_dark_charge(PlaneView<const float> raw_e, const denoise::RawNoise& noise, PlaneView<float> signal_e,
+                          Executor& executor);
 
 /// Sets the maps of a tile that keeps its noise: see NoiseMaps.
 /// @param raw_e  its corner at an even column and row of the active area

@@ -156,7 +156,7 @@ std::size_t NoiseReducer::bytes(int width, int height, const NoiseReduction& how
   if (!how.has_level()) return 0;
   const Piece frame{{0, 0, width, height}, {0, 0, width, height}, width, height};
   std::vector<LevelPart> parts;
-  cut_by_level(how, frame.core, TileLimits{}.side_px, parts);
+  split_by_level(how, frame.core, TileLimits{}.side_px, parts);
   const PartSize most = largest(parts, frame);
   const std::size_t denoiser = denoise::Denoiser::bytes(most.width, most.height, threads, max_level_of(how));
   if (parts.size() == 1) return denoiser;
@@ -180,7 +180,7 @@ void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const 
   const Rect core = seen_from(piece.whole, part.core);
   if (!part.level) {
     const Rect even = from_even_site(core);
-    take_dark_off(crop_of(raw_e, even), how.noise, crop_of(signal_e, even), executor_);
+    subtract_dark_charge(crop_of(raw_e, even), how.noise, crop_of(signal_e, even), executor_);
     const denoise::DenoiseMaps of_core = crop_of(maps, core);
     if (of_core.residual_variance.data == nullptr) return;
     return set_own_noise(region_of(piece, how, raw_e, part.core), how, of_core);
@@ -201,7 +201,7 @@ void NoiseReducer::reduce_part(const LevelPart& part, const Piece& piece, const 
 
 void NoiseReducer::reduce_by_level(const Piece& piece, const NoiseReduction& how, PlaneView<const float> raw_e,
                                    PlaneView<float> signal_e, const denoise::DenoiseMaps& maps) {
-  cut_by_level(how, piece.core, TileLimits{}.side_px, parts_);
+  split_by_level(how, piece.core, TileLimits{}.side_px, parts_);
   if (parts_.size() == 1 && parts_.front().level) {
     reserve_level(piece.whole.width, piece.whole.height, *parts_.front().level);
     denoise::DenoiseOptions options = how.options;
@@ -268,7 +268,7 @@ void NoiseReducer::run(const Piece& piece, const NoiseReduction& how, PlaneView<
   assert(piece.whole.width == piece.frame_width && piece.whole.height == piece.frame_height);
   reserve_time(raw_e.width, raw_e.height);
   reduce_by_time({raw_e, piece.phase}, how);
-  if (!how.has_level()) return take_dark_off(std::as_const(mean_e_).view(), how.noise, signal_e, executor_);
+  if (!how.has_level()) return subtract_dark_charge(std::as_const(mean_e_).view(), how.noise, signal_e, executor_);
   denoise::DenoiseMaps of_level = maps;
   if (maps.residual_variance.data == nullptr) {
     fit(level_maps_, raw_e.width, raw_e.height);

@@ -7,7 +7,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int most_pairs = 128;
+constexpr int max_pairs = 128;
 constexpr double darkest_fraction = 0.01;
 
 double mean_of(std::uint64_t sum, std::uint64_t pixels) {
@@ -18,7 +18,7 @@ double mean_of(std::uint64_t sum, std::uint64_t pixels) {
 
 bool is_metered_row(int y, int height) {
   const int pairs = std::max(height / 2, 1);
-  return (y / 2) % ((pairs + most_pairs - 1) / most_pairs) == 0;
+  return (y / 2) % ((pairs + max_pairs - 1) / max_pairs) == 0;
 }
 
 ExposureMeter::ExposureMeter(const RawFormat& format)
@@ -81,14 +81,14 @@ MeteredCodes ExposureMeter::codes(const MeteredBlack& black, double white_dn, do
   const double top_dn = std::clamp<double>(std::min(white_dn, saturation_dn_), 1, largest_);
   const std::size_t white = static_cast<std::size_t>(top_dn) >> shift_;
   MeteredCodes out;
-  double most_dn = 0;
+  double max_dn = 0;
   for (int i = 0; i < sites; ++i) {
     const Site& site = sites_[static_cast<std::size_t>(i)];
     const double floor_dn = black.is_bound ? 0 : black.dn[i];
     const double mean_dn = mean_of(site.sum, site.pixels) - black.dn[i];
     const double highlight_dn = exceeded_dn(site, fraction) - floor_dn;
-    if (i == 0 || mean_dn > most_dn) {
-      most_dn = mean_dn;
+    if (i == 0 || mean_dn > max_dn) {
+      max_dn = mean_dn;
       out.midtone_dn = exceeded_dn(site, 0.5) - black.dn[i];
     }
     out.highlight_dn = i == 0 ? highlight_dn : std::max(out.highlight_dn, highlight_dn);

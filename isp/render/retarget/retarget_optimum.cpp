@@ -9,7 +9,7 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr int most_steps = 100;
+constexpr int max_steps = 100;
 constexpr double smallest_step = 1e-7;    // of the code range
 constexpr double derivative_step = 1e-5;  // of the code range: the error of a forward difference is then as small
 constexpr double largest_damping = 1e9;   // of the mean curvature: steps are then negligible
@@ -172,7 +172,7 @@ MatchedColour closest_displayable(const AppearanceMatch& match, const Vector3& s
   out.cost = squares(r);
   Quadratic q = quadratic_at(problem, out.code, r);
   double damping = 1e-3;
-  while (out.steps < most_steps && !out.converged && damping < largest_damping) {
+  while (out.steps < max_steps && !out.converged && damping < largest_damping) {
     ++out.steps;
     const Vector3 step = step_from(q, damping, out.code);
     out.converged = largest(step) < smallest_step;

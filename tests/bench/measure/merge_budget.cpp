@@ -62,9 +62,9 @@ bool run(const Draw& draw, std::shared_ptr<CostModel> cost, SpeedProbe& pace, Ex
   const double now_s = test::value_of(pace_now(pace, executor));
   cost->pace = now_s / cost->pace_s;
   const MergeWork work{.frames = draw.frames, .size = cost_size(draw.size.width, draw.size.height)};
-  const double least_s = predicted_merge_s(*cost, work, {MergeAlignment::none, false}, false);
+  const double min_s = predicted_merge_s(*cost, work, {MergeAlignment::none, false}, false);
   const double most_s = predicted_merge_s(*cost, work, {MergeAlignment::subpixel, true}, true);
-  const double budget_s = 1.05 * least_s * std::pow(most_s / least_s, draw.place);
+  const double budget_s = 1.05 * min_s * std::pow(most_s / min_s, draw.place);
   const FrameReader read = [&](int index, bool) {
     DevelopOptions options;
     options.denoise.mode = DenoiseChoice::Mode::automatic;

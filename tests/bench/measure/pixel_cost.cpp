@@ -67,16 +67,16 @@ struct Times {
 
 /// Returns the processor time that some work of this thread takes, the least of several rounds.
 template <class Work>
-double least_time(const Work& work) {
-  double least_s = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < 7; ++round) least_s = std::min(least_s, 1e-3 * test::ms_of(test::cpu_ms, work));
-  return least_s;
+double min_time(const Work& work) {
+  double min_s = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < 7; ++round) min_s = std::min(min_s, 1e-3 * test::ms_of(test::cpu_ms, work));
+  return min_s;
 }
 
 Times times_of(const RawFrame& frame, std::optional<Level> level) {
-  const double bare_s = least_time([&] { (void)plan_develop(frame, options_for({}), one_thread); });
-  const double plan_s = least_time([&] { (void)plan_develop(frame, options_for(level), one_thread); });
-  const double whole_s = least_time([&] { (void)develop(frame, options_for(level), one_thread); });
+  const double bare_s = min_time([&] { (void)plan_develop(frame, options_for({}), one_thread); });
+  const double plan_s = min_time([&] { (void)plan_develop(frame, options_for(level), one_thread); });
+  const double whole_s = min_time([&] { (void)develop(frame, options_for(level), one_thread); });
   return {bare_s, plan_s - bare_s, whole_s - plan_s};
 }
 
@@ -144,7 +144,7 @@ bool are_predicted(std::uint32_t seed) {
     DevelopOptions options = options_for(level);
     options.effects->cost = model_of(size, light, level);
     const double predicted_s = *plan_develop(frame, options, one_thread)->effects->predicted_s;
-    const double ratio = least_time([&] { (void)develop(frame, options, one_thread); }) / predicted_s;
+    const double ratio = min_time([&] { (void)develop(frame, options, one_thread); }) / predicted_s;
     kept += std::fabs(ratio - 1) <= 0.2 ? 1 : 0;
     std::printf("%6s %10.3f %9s %15.1f %16.2f\n", layout == SensorLayout::monochrome ? "grey" : "RGB",
                 1e-6 * size.width * size.height, std::string(denoise::name_of(level)).c_str(), 1e3 * predicted_s,

@@ -60,8 +60,8 @@ Predicted predicted(const BenchRaw& raw) {
   options.find_defects = false;
   const Result<DevelopPlan> plan = plan_develop(raw.frame, options, two_threads);
   const Thumbnail thumbnail = make_thumbnail(raw.frame, plan->levels.black, two_threads);
-  const auto blocks = seen_blocks(raw.frame, options, plan->levels, plan->rendering, plan->noise_reduction.noise,
-                                  thumbnail, two_threads);
+  const auto blocks = visibility_blocks(raw.frame, options, plan->levels, plan->rendering, plan->noise_reduction.noise,
+                                        thumbnail, two_threads);
   return {*plan->noise_reduction.snr, level_noise(blocks)};
 }
 

@@ -48,7 +48,7 @@ TEST(RequestCamera, StartsWithAllBuffersQueuedAndDeliversWhatCompletes) {
   EXPECT_EQ(frame->facts.exposure_s, 0.5);
   EXPECT_FALSE(frame->damaged);
   EXPECT_EQ(script.readings, 1);
-  camera->give_back(*frame);
+  camera->return_buffer(*frame);
   EXPECT_EQ(script.readings, 0);
   EXPECT_EQ(script.queued, (std::deque<int>{1, 2, 0}));
 }
@@ -66,7 +66,7 @@ TEST(RequestCamera, CountsWhatIsMissingAlsoWhereTheCounterWrapsAround) {
     const auto frame = camera->next(milliseconds(0));
     ASSERT_TRUE(frame) << frame.error().message;
     EXPECT_EQ(frame->lost_before, step.lost) << step.sequence;
-    camera->give_back(*frame);
+    camera->return_buffer(*frame);
   }
 }
 
@@ -121,14 +121,14 @@ TEST(RequestCamera, AFrameIsGivenBackOnceAndOnlyToItsStream) {
   ASSERT_TRUE(camera->start());
   script.complete(0);
   const CameraFrame frame = *camera->next(milliseconds(0));
-  camera->give_back(frame);
-  camera->give_back(frame);
+  camera->return_buffer(frame);
+  camera->return_buffer(frame);
   EXPECT_EQ(script.queued.size(), 3U);
   EXPECT_EQ(script.readings, 0);
   CameraFrame foreign = frame;
   for (const int buffer : {-1, buffer_count, 1}) {
     foreign.buffer = buffer;
-    camera->give_back(foreign);
+    camera->return_buffer(foreign);
   }
   EXPECT_EQ(script.queued.size(), 3U);
 }
@@ -145,7 +145,7 @@ TEST(RequestCamera, StopVoidsLentFramesAndStartBeginsAnew) {
   camera->stop();
   EXPECT_EQ(script.stops, 1);
   EXPECT_EQ(script.readings, 0);
-  camera->give_back(lent);
+  camera->return_buffer(lent);
   EXPECT_TRUE(script.queued.empty());
   ASSERT_TRUE(camera->start());
   EXPECT_EQ(script.queued, (std::deque<int>{0, 1, 2}));
@@ -193,7 +193,7 @@ TEST(RequestCamera, ABufferRefusedLaterIsReportedOnceNothingElseCompletes) {
   const CameraFrame frame = *camera->next(milliseconds(0));
   script.complete(1);
   script.queue_result = -EINVAL;
-  camera->give_back(frame);
+  camera->return_buffer(frame);
   EXPECT_TRUE(camera->next(milliseconds(0)));
   EXPECT_EQ(code_of(camera->next(milliseconds(0))), ErrorCode::unreadable);
 }
@@ -203,7 +203,7 @@ TEST(RequestCamera, AnUnpluggedCameraStaysDead) {
   const auto camera = camera_of(script);
   ASSERT_TRUE(camera->start());
   script.complete(0);
-  script.completions->set_gone();
+  script.completions->set_disconnected();
   EXPECT_TRUE(camera->next(milliseconds(0)));  // it was there before
   EXPECT_EQ(code_of(camera->next(milliseconds::max())), ErrorCode::not_found);
   camera->stop();
@@ -218,7 +218,7 @@ TEST(RequestCamera, ABufferRefusedForWantOfTheDeviceMeansThatItIsGone) {
   script.complete(0);
   const CameraFrame frame = *camera->next(milliseconds(0));
   script.queue_result = -ENODEV;
-  camera->give_back(frame);
+  camera->return_buffer(frame);
   EXPECT_EQ(code_of(camera->next(milliseconds::max())), ErrorCode::not_found);
 }
 
@@ -232,7 +232,7 @@ TEST(RequestCamera, CancelledFramesEndTheStreamOrTellThatTheCameraIsGone) {
   EXPECT_EQ(ended.error().code, ErrorCode::unreadable);
   EXPECT_EQ(ended.error().message, "the camera ended the stream: start it again");
   script.complete(1, CompletionState::cancelled);
-  script.completions->set_gone();
+  script.completions->set_disconnected();
   EXPECT_EQ(code_of(camera->next(milliseconds(0))), ErrorCode::not_found);
 }
 
@@ -243,7 +243,7 @@ TEST(RequestCamera, AFrameOrUnpluggingOfAnotherThreadEndsTheWait) {
   std::thread completes([&] { script.complete(0); });
   EXPECT_TRUE(camera->next(std::chrono::hours(1)));
   completes.join();
-  std::thread unplugs([&] { script.completions->set_gone(); });
+  std::thread unplugs([&] { script.completions->set_disconnected(); });
   EXPECT_EQ(code_of(camera->next(std::chrono::hours(1))), ErrorCode::not_found);
   unplugs.join();
 }
@@ -284,7 +284,7 @@ TEST(RequestCamera, PassesTheExposureOnAndTheErrorOfACameraWithout) {
   EXPECT_EQ(camera->set_exposure({.exposure_s = 0.25}).value(), 0.25);
   ASSERT_EQ(script.exposures.size(), 1u);
   EXPECT_EQ(script.exposures[0].exposure_s, 0.25);
-  script.completions->set_gone();
+  script.completions->set_disconnected();
   EXPECT_EQ(camera->set_exposure({.exposure_s = 0.5}).error().code, ErrorCode::not_found);
 }
 

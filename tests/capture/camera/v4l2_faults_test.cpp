@@ -109,7 +109,7 @@ TEST(V4l2Stream, UnpluggingDuringAnyCallOfAStreamIsGoneAndLeavesNothing) {
         for (int i = 0; error && i < 3; ++i) {
           const auto frame = camera->next(second);
           if (frame) {
-            camera->give_back(*frame);
+            camera->return_buffer(*frame);
           } else {
             error = tl::make_unexpected(frame.error());
           }
@@ -178,9 +178,9 @@ TEST(V4l2Start, MemoryIsMappedWholeAndBoundedOrNotAtAll) {
   FakeV4l2 fake;
   fake.buffer_length = 72 * 23 + 63;  // a byte less than a frame
   EXPECT_EQ(not_started(fake).code, ErrorCode::malformed);
-  fake.length_told = (2u << 30) / 4 + 1;  // four of them are over 2 GiB
+  fake.stated_length = (2u << 30) / 4 + 1;  // four of them are over 2 GiB
   EXPECT_EQ(not_started(fake).code, ErrorCode::too_large);
-  fake.length_told.reset();
+  fake.stated_length.reset();
   fake.buffer_length = 72 * 23 + 64;
   fake.buffers_given = 32;
   fake.frames = {{}};
@@ -231,7 +231,7 @@ int random_life(unsigned seed) {
         if (random() % 4 == 0) (*camera)->stop();
         break;
       case 2:
-        if (!held.empty()) (*camera)->give_back(held[random() % held.size()]);
+        if (!held.empty()) (*camera)->return_buffer(held[random() % held.size()]);
         break;
       default:
         fake.frames.push_back(

@@ -39,7 +39,7 @@ TEST(V4l2Stream, DeliversTheBytesOfTheDriversBuffersByBothWaysAndBothInterfaces)
           EXPECT_EQ(frame.timestamp, std::chrono::microseconds(12'345'678));
           EXPECT_FALSE(frame.damaged);
           EXPECT_EQ(fake.accesses, memory == V4l2Memory::dma_buf ? 1 : 0);
-          camera->give_back(frame);
+          camera->return_buffer(frame);
           EXPECT_EQ(fake.queued(), 4u);
         }
       }
@@ -75,7 +75,7 @@ TEST(V4l2Stream, ShortAndFaultyFramesAreDamagedAndReadable) {
     const CameraFrame frame = camera->next(second).value();
     EXPECT_EQ(frame.damaged, damaged);
     EXPECT_EQ(frame.bytes.size(), whole);
-    camera->give_back(frame);
+    camera->return_buffer(frame);
   }
   const Error lie = camera->next(second).error();
   EXPECT_EQ(lie.code, ErrorCode::malformed);
@@ -106,7 +106,7 @@ TEST(V4l2Stream, GapsAreCountedAcrossTheWrapAndRepeatsAndStepsBackAreNone) {
   for (const Step& step : steps) {
     const CameraFrame frame = camera->next(second).value();
     EXPECT_EQ(frame.lost_before, step.lost) << step.sequence;
-    camera->give_back(frame);
+    camera->return_buffer(frame);
   }
   // A new start counts anew.
   camera->stop();
@@ -129,7 +129,7 @@ TEST(V4l2Stream, TimesOfAnotherClockAreDroppedWithOneWarning) {
     const CameraFrame frame = camera->next(second).value();
     EXPECT_EQ(frame.timestamp == milliseconds(0), warnings == 1);
     EXPECT_EQ(camera->warnings().size(), warnings);
-    camera->give_back(frame);
+    camera->return_buffer(frame);
   }
 }
 
@@ -170,21 +170,21 @@ TEST(V4l2GiveBack, FramesOfAnEarlierStartAndFramesGivenTwiceAreLeftAlone) {
   const auto camera = started(fake, {.memory = V4l2Memory::dma_buf});
   const CameraFrame old = camera->next(second).value();
   const CameraFrame held = camera->next(second).value();
-  camera->give_back(held);
-  camera->give_back(held);
+  camera->return_buffer(held);
+  camera->return_buffer(held);
   EXPECT_EQ(fake.queued(), 3u);
   camera->stop();
-  camera->give_back(old);
+  camera->return_buffer(old);
   fake.frames = {{.sequence = 1}};
   ASSERT_TRUE(camera->start());
   ASSERT_TRUE(camera->start());  // has been
   const CameraFrame fresh = camera->next(second).value();
-  camera->give_back(old);
+  camera->return_buffer(old);
   EXPECT_EQ(fake.queued(), 3u);  // the fresh one is still ours
   CameraFrame foreign = fresh;
   for (const int buffer : {-1, fresh.buffer + 9, fresh.buffer + 1000}) {
     foreign.buffer = buffer;
-    camera->give_back(foreign);
+    camera->return_buffer(foreign);
   }
   EXPECT_EQ(fake.queued(), 3u);
   EXPECT_EQ(fake.misuses, 0);
@@ -198,7 +198,7 @@ TEST(V4l2GiveBack, WithAllBuffersOutNoFrameIsWaitedFor) {
   EXPECT_TRUE(camera->next(second));
   EXPECT_TRUE(has(camera->next(second).error(), "all 2 buffers are in use"));
   EXPECT_EQ(fake.now_ms, 0);
-  camera->give_back(first);
+  camera->return_buffer(first);
   EXPECT_TRUE(camera->next(second));
 }
 
@@ -209,7 +209,7 @@ TEST(V4l2GiveBack, WhatTheDriverDoesNotTakeBackIsTheNextError) {
     const auto camera = started(fake, {.memory = V4l2Memory::dma_buf});
     const CameraFrame frame = camera->next(second).value();
     fake.faults[request] = {EIO, 1};
-    camera->give_back(frame);
+    camera->return_buffer(frame);
     EXPECT_EQ(camera->next(second).error().code, ErrorCode::unreadable);
     camera->stop();
     ASSERT_TRUE(camera->start());

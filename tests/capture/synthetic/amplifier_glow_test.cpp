@@ -133,7 +133,7 @@ TEST(AmplifierGlow, LevelsOfBlocksAddUpToTheFrames) {
       const isp::BlockLevel::Glow& glow = blocks[i].glow;
       block_sum += n * glow.mean_e;
       block_square += n * (glow.variance_e2 + glow.mean_e * glow.mean_e);
-      block_least = std::min(block_least, glow.least_e);
+      block_least = std::min(block_least, glow.min_e);
       block_peak = std::max(block_peak, glow.peak_e);
     }
     EXPECT_NEAR(block_sum / sum, 1, 1e-9) << seed;

@@ -44,7 +44,7 @@ double largest_difference(const ColourMap& map, const Xyz& colour) {
 
 bool is_finite(const Xyz& c) { return std::isfinite(c.x) && std::isfinite(c.y) && std::isfinite(c.z); }
 
-TEST(AppearanceModels, HaveNamesOfTheirOwnAndSayWhatTheyLack) {
+TEST(AppearanceModels, HaveUniqueNamesAndStateTheirLimitations) {
   std::set<std::string_view> names;
   for (const AppearanceModel& model : appearance_models()) {
     names.insert(model.name);
@@ -148,7 +148,7 @@ TEST(AppearanceModels, ChangeWithoutAJumpWhenTheLightIsTurnedDown) {
   }
 }
 
-TEST(AppearanceModels, KeepWhatTheySayTheyKeep) {
+TEST(AppearanceModels, KeepThePropertiesThatTheyState) {
   const Xyz colour = rgb(0.5, 0.2, 0.1);
   for (const char* name : {"hunt", "kwak"}) {
     const Xyz out = map_of(name, at_white(0.5))(colour);

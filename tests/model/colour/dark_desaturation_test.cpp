@@ -94,7 +94,7 @@ TEST(DarkDesaturation, BothFormsOfTheUndoAgreeOnMeans) {
   }
 }
 
-TEST(DarkDesaturation, DarkAloneTellsNothingOfTheLight) {
+TEST(DarkDesaturation, DarkAloneDoesNotDetermineTheLight) {
   EXPECT_FALSE(resaturated(Xy{0.31, 0.33}, {0.31, 0.33}, 0));
   EXPECT_FALSE(resaturated(Xy{0.4, 0.33}, {0.31, 0.33}, 0));
   EXPECT_FALSE(resaturated(Xy{0.4, 0.33}, {0.31, 0.33}, -0.1));

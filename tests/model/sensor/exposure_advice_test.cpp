@@ -84,7 +84,7 @@ TEST(ExposureAdvice, OfPixelsThatHoldMoreThanTheConverterNamesTheConverter) {
 TEST(ExposureAdvice, StopsWhereTheShareThatNoiseClipsIsTheOneAllowed) {
   for (const double share : {1e-6, 1e-3, 0.1, 0.5}) {
     AdviceRequest r = request_of(10, 100, 10);
-    r.clipped_share = share;
+    r.clipped_fraction = share;
     const auto advice = advise_exposure(r);
     ASSERT_TRUE(advice);
     for (std::size_t i = 0; i < r.gains.size(); ++i) {
@@ -219,8 +219,8 @@ TEST(ExposureAdvice, RefusesWhatCannotBeAndSaysWhich) {
                         {[](AdviceRequest& r) { r.midtone_cd_m2 = nan; }, "mid tone's luminance"},
                         {[](AdviceRequest& r) { r.highlight_cd_m2 = 0.01; }, "at least as bright"},
                         {[](AdviceRequest& r) { r.highlight_cd_m2 = inf; }, "at least as bright"},
-                        {[](AdviceRequest& r) { r.clipped_share = 0; }, "allowed to clip"},
-                        {[](AdviceRequest& r) { r.clipped_share = 0.6; }, "allowed to clip"},
+                        {[](AdviceRequest& r) { r.clipped_fraction = 0; }, "allowed to clip"},
+                        {[](AdviceRequest& r) { r.clipped_fraction = 0.6; }, "allowed to clip"},
                         {[](AdviceRequest& r) { r.longest_exposure_s = 0; }, "longest exposure"},
                         {[](AdviceRequest& r) { r.longest_exposure_s = inf; }, "exposure time"},
                         {[](AdviceRequest& r) { r.temperature_c = -300; }, "temperature"},

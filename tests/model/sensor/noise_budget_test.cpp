@@ -171,7 +171,7 @@ TEST(CheckSensor, TheFloorIsNoMoreThanTheLeastDarkCurrent) {
   EXPECT_NE(check_sensor(s).error().message.find("2 e-/s, found 2.001"), std::string::npos);
 }
 
-TEST(CheckSensor, NamesWhatIsWrongAndWhatItFound) {
+TEST(CheckSensor, NamesTheFaultAndTheValueFound) {
   const auto message = [](double SensorModel::*member, double value) {
     SensorModel s = good_sensor();
     s.*member = value;

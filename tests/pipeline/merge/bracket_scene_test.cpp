@@ -27,12 +27,12 @@ double limit_e() { return merge::full_weight_fraction * saturated_from * test::n
 /// Blocks of 16 x 16 pixels in random order whose light follows a power law: a fraction u of them is brighter than
 /// min_e u^(-1 / exponent).
 struct PowerLaw {
-  double least_e = 0;
+  double min_e = 0;
   double exponent = 1;
   std::vector<double> signal_e;
 
-  PowerLaw(double least, double power, std::uint64_t seed) : least_e(least), exponent(power), signal_e(blocks) {
-    for (int i = 0; i < blocks; ++i) signal_e[i] = least_e * std::pow((i + 0.5) / blocks, -1 / exponent);
+  PowerLaw(double least, double power, std::uint64_t seed) : min_e(least), exponent(power), signal_e(blocks) {
+    for (int i = 0; i < blocks; ++i) signal_e[i] = min_e * std::pow((i + 0.5) / blocks, -1 / exponent);
     std::ranges::shuffle(signal_e, std::mt19937_64(seed));
   }
   double fraction_above(double level_e) const {
@@ -65,9 +65,9 @@ TEST(BracketScene, ExtrapolatesThePowerLawOfTheLightBeyondSaturation) {
   InlineExecutor executor;
   std::mt19937_64 random(2614);
   for (int i = 0; i < 8; ++i) {
-    const double least_e = std::uniform_real_distribution<>(5, 40)(random);  // one by one: in the same order everywhere
+    const double min_e = std::uniform_real_distribution<>(5, 40)(random);  // one by one: in the same order everywhere
     const double exponent = std::uniform_real_distribution<>(0.5, 1)(random);
-    const PowerLaw law(least_e, exponent, random());
+    const PowerLaw law(min_e, exponent, random());
     const Burst burst = law.burst();
     const double clipped = 0.002;
     const auto scene = measure_bracket_scene(burst.frame(0), burst.options(), clipped, executor);

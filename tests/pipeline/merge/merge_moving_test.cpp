@@ -142,8 +142,8 @@ TEST(MergeMoving, FramesThatDoNotCoverAllColoursGainToo) {
 }
 
 /// Shades the corners of a frame to a share of its light, and states the gain that corrects it. Saturated pixels stay.
-void shade(RawFrame& frame, double corner_share) {
-  const double k = 1 / corner_share - 1;
+void shade(RawFrame& frame, double corner_fraction) {
+  const double k = 1 / corner_fraction - 1;
   const Plane<std::uint16_t>& dn = frame.raw.dn;
   const double cx = 0.5 * (dn.width() - 1), cy = 0.5 * (dn.height() - 1), corner2 = cx * cx + cy * cy;
   for (int y = 0; y < dn.height(); ++y) {
@@ -162,12 +162,12 @@ TEST(MergeMoving, ShadingOfTheLensIsThatOfTheReference) {
   const Burst even = hand_held(60);
   const MergedRaw expected = even.merged(6, {.alignment = MergeAlignment::subpixel});
   // Mean and mean square, relative to the scene.
-  const auto relative_errors = [&](const MergedRaw& merged, double corner_share) {
+  const auto relative_errors = [&](const MergedRaw& merged, double corner_fraction) {
     std::pair<double, double> out;
     for (int y = middle.y; y < middle.y + middle.height; ++y) {
       for (int x = middle.x; x < middle.x + middle.width; ++x) {
         const double r2 = (std::pow(x - 159.5, 2) + std::pow(y - 127.5, 2)) / (159.5 * 159.5 + 127.5 * 127.5);
-        const double share = 1 / (1 + (1 / corner_share - 1) * r2);
+        const double share = 1 / (1 + (1 / corner_fraction - 1) * r2);
         const double error = Burst::signal_e(merged.frame, x, y) / share / even.truth_e(x, y) - 1;
         out.first += error / (middle.width * middle.height);
         out.second += error * error / (middle.width * middle.height);
@@ -175,18 +175,18 @@ TEST(MergeMoving, ShadingOfTheLensIsThatOfTheReference) {
     }
     return out;
   };
-  for (const double corner_share : {0.7, 0.4}) {
+  for (const double corner_fraction : {0.7, 0.4}) {
     Burst shaded = even;
-    shaded.disturb = [&](RawFrame& frame, int) { shade(frame, corner_share); };
+    shaded.disturb = [&](RawFrame& frame, int) { shade(frame, corner_fraction); };
     const MergedRaw merged = shaded.merged(6, {.alignment = MergeAlignment::subpixel});
     for (std::size_t i = 1; i < merged.frames.size(); ++i) {
-      EXPECT_GT(merged.frames[i].used_fraction, 0.97) << i << ' ' << corner_share;
+      EXPECT_GT(merged.frames[i].used_fraction, 0.97) << i << ' ' << corner_fraction;
       EXPECT_NEAR(merged.frames[i].largest_shift_px, expected.frames[i].largest_shift_px, 0.3)
-          << i << ' ' << corner_share;
+          << i << ' ' << corner_fraction;
     }
-    const auto [bias, square] = relative_errors(merged, corner_share);
-    EXPECT_NEAR(bias, 0, 0.005) << corner_share;
-    EXPECT_LT(square, 1.1 * relative_errors(expected, 1).second) << corner_share;
+    const auto [bias, square] = relative_errors(merged, corner_fraction);
+    EXPECT_NEAR(bias, 0, 0.005) << corner_fraction;
+    EXPECT_LT(square, 1.1 * relative_errors(expected, 1).second) << corner_fraction;
   }
 }
 
