@@ -401,10 +401,11 @@ void Denoiser::run(const RawElectronsView& raw, const RawNoise& noise, const Den
   }
   fill_saturated_chroma(state_->memory, run.levels, run.workers);
   build_pyramid(frame);
-  run_pass(frame, 0, options.level == Level::best ? 2 : 4);
+  const int rows_apart = options.level >= Level::high ? 2 : 4;
+  run_pass(frame, 0, rows_apart);
   int last = 0;
   if (options.level != Level::draft) {
-    run_pass(frame, 1, options.level >= Level::high ? 2 : 4);
+    run_pass(frame, 1, rows_apart);
     last = 1;
   }
   if (options.level == Level::best) {

@@ -19,7 +19,7 @@ struct Shrink {
   const PassFrame& frame;
   int l;
   int pass;
-  int step;
+  int rows_apart;  // cells from one row of blocks to the next
 
   const PyramidLevel& level() const { return frame.memory.level[l]; }
 
@@ -27,12 +27,12 @@ struct Shrink {
   void wanted(int y0, std::uint8_t* strip) const {
     const ChromaStarts& s = frame.starts;
     const unsigned char* const has = s.has_chroma.data() + l * s.columns * s.rows;
-    const int blocks = (level().width - block) / step + 1;
+    const int blocks = (level().width - block) / 2 + 1;
     const int top = tile_of(y0 << l, s.rows), bottom = tile_of((y0 + block - 1) << l, s.rows);
     for (int first = 0; first < blocks; first += rows::strip_blocks) {
       const int last = std::min(blocks, first + rows::strip_blocks) - 1;
-      const int left = tile_of((first * step) << l, s.columns);
-      const int right = tile_of((last * step + block - 1) << l, s.columns);
+      const int left = tile_of((first * 2) << l, s.columns);
+      const int right = tile_of((last * 2 + block - 1) << l, s.columns);
       bool any = false;
       for (int y = top; y <= bottom; ++y) {
         for (int x = left; x <= right; ++x) any = any || has[y * s.columns + x] != 0;
@@ -51,10 +51,10 @@ struct Shrink {
     }
     in.stride = at.noisy.stride;
     in.variance_stride = at.variance.stride;
-    in.blocks = (at.width - block) / step + 1;
-    in.step = step;
+    in.blocks = (at.width - block) / 2 + 1;
+    in.rows_apart = rows_apart;
     for (const PlaneKind kind : {PlaneKind::luma, PlaneKind::chroma}) {
-      const ResidualShares shares = residual_fractions(kind, pass, step, l, frame.levels);
+      const ResidualShares shares = residual_fractions(kind, pass, rows_apart, l, frame.levels);
       in.left[kind == PlaneKind::luma ? 0 : 1] = {shares.kept, shares.other, shares.mean};
     }
     in.chroma = planes_of(frame, l) == 4 ? chroma : nullptr;
@@ -99,10 +99,11 @@ struct Shrink {
     const ScratchUse use(m.scratch);
     const int height = level().height;
     std::uint8_t chroma[1 + largest_side / 2 / 2 / rows::strip_blocks];  // blocks 2 cells apart, cells of 2 sites
-    for (int y0 = std::max(0, first - block + step); y0 <= std::min(height - block, last - step); y0 += step) {
+    for (int y0 = std::max(0, first - block + rows_apart); y0 <= std::min(height - block, last - rows_apart);
+         y0 += rows_apart) {
       wanted(y0, chroma);
       rows::shrink_block_row(block_row(y0, chroma), m.blocks, sums(m, y0));
-      const int complete = y0 == height - block ? block : step;
+      const int complete = y0 == height - block ? block : rows_apart;
       for (int y = y0; y < y0 + complete; y += 2) finish(m, y, y >= first && y < last);
     }
   }
@@ -203,9 +204,9 @@ void build_pyramid(const PassFrame& frame) {
   }
 }
 
-void run_pass(const PassFrame& frame, int pass, int step) {
+void run_pass(const PassFrame& frame, int pass, int rows_apart) {
   for (int l = frame.levels - 1; l >= 0; --l) {
-    Shrink{frame, l, pass, step}.run();
+    Shrink{frame, l, pass, rows_apart}.run();
     if (l + 1 < frame.levels) recompose(frame, l, pass);
   }
 }

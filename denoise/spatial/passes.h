@@ -23,8 +23,8 @@ void build_pyramid(const PassFrame& frame);
 
 /// Runs pass 0 with hard thresholds, or pass 1 with Wiener gains from the result of pass 0. Fills value[pass] and
 /// `residual` of all levels; each level's value is recomposed from the coarser ones.
-/// @param step cells from one block to the next, 2 or 4
-void run_pass(const PassFrame& frame, int pass, int step);
+/// @param rows_apart cells from one row of blocks to the next, 2 or 4; in a row, blocks are 2 cells apart
+void run_pass(const PassFrame& frame, int pass, int rows_apart);
 
 /// Adds value[pass] of `level`, the result of its blocks or patches, to that of the next coarser level.
 void recompose(const PassFrame& frame, int level, int pass);

@@ -24,16 +24,16 @@ enum class PlaneKind : unsigned char { luma, chroma };
 /// own fine structure to G3 and up2: one quarter of their kept variance counts. `other` is measured on white noise by
 /// tests/denoise/flat_noise: within 3 % on the finest level, within a third on coarser ones, which are a tenth of the
 /// total. Cross-covariances between levels are included in that of the finest.
-constexpr ResidualShares residual_fractions(PlaneKind kind, int pass, int step, int level, int levels) {
+constexpr ResidualShares residual_fractions(PlaneKind kind, int pass, int rows_apart, int level, int levels) {
   struct Other {
     float finest;
     float coarser;
   };
-  const int recipe = pass == 0 ? 0 : step == 4 ? 1 : 2;
-  constexpr Other other[2][3] = {{{68.1e-6f, 2.5e-6f}, {42.1e-6f, 4.0e-6f}, {21.4e-6f, 1.2e-6f}},
-                                 {{9.8e-6f, 4.0e-6f}, {9.6e-6f, 4.1e-6f}, {7.7e-6f, 1.9e-6f}}};
+  const int recipe = pass == 0 ? 0 : rows_apart == 4 ? 1 : 2;
+  constexpr Other other[2][3] = {{{25.8e-6f, 0}, {19.9e-6f, 2.8e-6f}, {11.9e-6f, 2.1e-6f}},
+                                 {{8.3e-6f, 2.3e-6f}, {8.8e-6f, 2.6e-6f}, {7.3e-6f, 1.9e-6f}}};
   const Other& o = other[kind == PlaneKind::luma ? 0 : 1][recipe];
-  const float mean = (recipe == 2 ? 0.473f : 0.634f) / 64;
+  const float mean = (recipe == 2 ? 0.473f : 0.548f) / 64;
   return {level == 0 ? 1.0f / 64 : 0.25f / 64, level == 0 ? o.finest : o.coarser, level + 1 == levels ? mean : 0};
 }
 

@@ -104,7 +104,7 @@ struct BlockRow {
   const float* variance[4];  // variance of half width and height
   std::ptrdiff_t variance_stride;
   int blocks;
-  int step;                    // cells from one block to the next, 2 or 4
+  int rows_apart;              // cells to the next row of blocks, 2 or 4; in a row, blocks are 2 cells apart
   ResidualOfBlocks left[2];    // luma, chroma
   const std::uint8_t* chroma;  // for each strip, whether C1, C2, C3 are wanted; null: nowhere
   /// Power of a spectrum shaped like that of luma over that of the chroma that is known: at least as much is expected.

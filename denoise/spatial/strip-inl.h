@@ -18,8 +18,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace lowlux::denoise::rows::HWY_NAMESPACE {
 
-// Lanes are adjacent blocks. Column c of block i is cell step * i + c, i.e. place i + c / step of the run of the cells
-// of phase c % step: rows are split into such runs once, so that all later accesses are contiguous.
+// Lanes are adjacent blocks, which are two cells apart. Column c of block i is cell 2 i + c, i.e. place i + c / 2 of
+// the run of the cells of phase c % 2: rows are split into such runs once, so that all later accesses are contiguous.
 
 constexpr int run = strip_blocks + 32;  // places of one run in a strip, including the columns of the last blocks
 constexpr int lead = 16;                // empty places before a strip's blocks, which shifted reads may touch
@@ -27,75 +27,43 @@ constexpr int places = lead + run;
 
 /// Memory for one strip, zero at first: places that no strip writes, before the first block and after the last, stay 0.
 struct Strip {
-  float noisy[8][4][run];  // vertical frequency, phase, place
-  float pilot[8][4][run];
+  float noisy[8][2][run];  // vertical frequency, phase, place
+  float pilot[8][2][run];
   /// Of luma, for chroma: the square of a coefficient, with hard thresholds where it is kept, with Wiener gains that of
   /// the pilot; 0 elsewhere and for the mean.
   float luma[64][run];
   float luma_power[run];    // the sum of these squares, and 4 V
   float value[64][places];  // vertical frequency and column of blocks, before the inverse vertical transform
-  float weight[2][places];  // times each of the window's values
+  float weight[places];
 };
 
-/// Returns which of the window's values row or column i of a block has: 1 in the middle half, else 0; blocks 2 cells
-/// apart have the first alone.
-template <int kStep>
-constexpr int window_index(int i) {
-  return kStep == 4 && i >= 2 && i < 6 ? 1 : 0;
-}
-
-/// Returns the window in row or column i of a block. Blocks 4 cells apart have one that is higher in their middle and
-/// adds up to the same in each cell, so that the edges of single blocks do not show; blocks 2 cells apart need none. It
-/// is the same for pairs of cells, so that half the weights suffice each way.
-template <int kStep>
-constexpr float window(int i) {
-  return kStep == 2 ? 1 : window_index<kStep>(i) == 1 ? 5 : 2;
-}
-
-template <int kStep>
-struct Interleaved;
-template <>
-struct Interleaved<1> {
-  static HWY_INLINE void store(const VF (&v)[1], float* to) { hn::StoreU(v[0], Floats(), to); }
-};
-template <>
-struct Interleaved<2> {
-  static HWY_INLINE void load(const float* from, VF (&v)[2]) { hn::LoadInterleaved2(Floats(), from, v[0], v[1]); }
-  static HWY_INLINE void store(const VF (&v)[2], float* to) { hn::StoreInterleaved2(v[0], v[1], Floats(), to); }
-};
-template <>
-struct Interleaved<4> {
-  static HWY_INLINE void load(const float* from, VF (&v)[4]) {
-    hn::LoadInterleaved4(Floats(), from, v[0], v[1], v[2], v[3]);
-  }
-  static HWY_INLINE void store(const VF (&v)[4], float* to) {
-    hn::StoreInterleaved4(v[0], v[1], v[2], v[3], Floats(), to);
-  }
-};
+/// Returns the window in row i of a block. Blocks 4 rows apart have one that is higher in their middle and adds up to
+/// the same in each row, so that the edges of single blocks do not show; blocks 2 cells apart need none. It is the same
+/// for pairs of rows, so that half the weights suffice.
+constexpr float window(int rows_apart, int i) { return rows_apart == 2 ? 1 : i >= 2 && i < 6 ? 5 : 2; }
 
 /// Computes the vertical transform of the cells of `count` blocks, split into runs.
-template <int kStep>
-HWY_INLINE void transform_columns(const float* from, std::ptrdiff_t stride, int count, float (*out)[4][run]) {
-  HWY_ALIGN float rows[8][4 * hn::MaxLanes(Floats())];
+HWY_INLINE void transform_columns(const float* from, std::ptrdiff_t stride, int count, float (*out)[2][run]) {
+  HWY_ALIGN float rows[8][2 * hn::MaxLanes(Floats())];
   const int n = lanes();
-  for (int k = 0; k < count + 8 / kStep - 1; k += n) {
-    for (int part = 0; part < kStep; ++part) {
+  for (int k = 0; k < count + 3; k += n) {
+    for (int part = 0; part < 2; ++part) {
       VF x[8];
-      for (int y = 0; y < 8; ++y) x[y] = load(from + y * stride + kStep * k + part * n);
+      for (int y = 0; y < 8; ++y) x[y] = load(from + y * stride + 2 * k + part * n);
       forward8(x);
       for (int y = 0; y < 8; ++y) store(x[y], rows[y] + part * n);
     }
     for (int y = 0; y < 8; ++y) {
-      VF phases[kStep];
-      Interleaved<kStep>::load(rows[y], phases);
-      for (int j = 0; j < kStep; ++j) store(phases[j], out[y][j] + k);
+      VF even, odd;
+      hn::LoadInterleaved2(Floats(), rows[y], even, odd);
+      store(even, out[y][0] + k);
+      store(odd, out[y][1] + k);
     }
   }
 }
 
-template <int kStep>
 HWY_INLINE void coefficients(const float (*from)[run], int place, VF (&x)[8]) {
-  for (int c = 0; c < 8; ++c) x[c] = load(from[c % kStep] + place + c / kStep);
+  for (int c = 0; c < 8; ++c) x[c] = load(from[c % 2] + place + c / 2);
   forward8(x);
 }
 
@@ -157,11 +125,10 @@ constexpr std::array<float, 64> faint_shape = faint_shapes();
 struct Coefficients {
   HWY_ALIGN float value[64 * hn::MaxLanes(Floats())];
 
-  template <int kStep>
   HWY_INLINE void read(const Strip& s, int place) {
     for (int v = 0; v < 8; ++v) {
       VF x[8];
-      coefficients<kStep>(s.noisy[v], place, x);
+      coefficients(s.noisy[v], place, x);
       for (int u = 0; u < 8; ++u) store(x[u], value + (8 * v + u) * lanes());
     }
   }
@@ -193,14 +160,13 @@ struct SumsBelow {
 };
 
 /// Hard threshold of luma. What falls below gets the gain P / (P + V), where P is the spectrum of faint signal.
-template <int kStep>
 HWY_INLINE VF threshold_luma(Strip& s, int place, VF variance) {
   const Floats f;
   const VF least = hn::Mul(constant(9), variance), noise = hn::Mul(constant(below_3_sigma), variance);
   VF kept_power = hn::Zero(f);
   SumsBelow below{hn::Zero(f), hn::Zero(f)};
   Coefficients all;
-  all.read<kStep>(s, place);
+  all.read(s, place);
   store(hn::Zero(f), s.luma[0] + place);
   for (int i = 1; i < 64; ++i) {
     const VF x = all.at(i), square = hn::Mul(x, x);
@@ -222,7 +188,6 @@ HWY_INLINE VF threshold_luma(Strip& s, int place, VF variance) {
 /// Thresholds of chroma, after that of luma: lower where luma is kept. What falls below gets the gain P / (P + V),
 /// where P is the larger of a spectrum shaped like that of the luma and of that of faint signal.
 /// @param luma_shaped  power of the former over that of what is kept
-template <int kStep>
 HWY_INLINE VF threshold_chroma(Strip& s, int place, VF variance, float luma_shaped) {
   const Floats f;
   const VF least = hn::Mul(constant(16), variance), least_beside_luma = hn::Mul(constant(6.25f), variance);
@@ -233,7 +198,7 @@ HWY_INLINE VF threshold_chroma(Strip& s, int place, VF variance, float luma_shap
   VF kept_power = hn::Zero(f);
   SumsBelow below{hn::Zero(f), hn::Zero(f)};
   Coefficients all;
-  all.read<kStep>(s, place);
+  all.read(s, place);
   for (int i = 1; i < 64; ++i) {
     const VF x = all.at(i), square = hn::Mul(x, x), luma = load(s.luma[i] + place);
     const auto kept = is_kept(square, luma);
@@ -253,12 +218,11 @@ HWY_INLINE VF threshold_chroma(Strip& s, int place, VF variance, float luma_shap
 
 /// Stores the squares of the pilot's coefficients for one group of blocks, 0 for the mean, and returns their sum.
 /// @param square  64 vectors, `stride` floats apart
-template <int kStep>
 HWY_INLINE VF pilot_squares(const Strip& s, int place, float* square, std::ptrdiff_t stride) {
   VF sum = hn::Zero(Floats());
   for (int v = 0; v < 8; ++v) {
     VF x[8];
-    coefficients<kStep>(s.pilot[v], place, x);
+    coefficients(s.pilot[v], place, x);
     if (v == 0) x[0] = hn::Zero(Floats());
     for (int u = 0; u < 8; ++u) {
       const VF power = hn::Mul(x[u], x[u]);
@@ -270,24 +234,22 @@ HWY_INLINE VF pilot_squares(const Strip& s, int place, float* square, std::ptrdi
 }
 
 /// Empirical Wiener gains of luma: P is the pilot's.
-template <int kStep>
 HWY_INLINE VF wiener_luma(Strip& s, int place, VF variance) {
-  const VF sum = pilot_squares<kStep>(s, place, s.luma[0] + place, run);
+  const VF sum = pilot_squares(s, place, s.luma[0] + place, run);
   store(hn::MulAdd(constant(4), variance, sum), s.luma_power + place);
-  const auto row = [&](int v, VF(&x)[8]) HWY_ATTR { coefficients<kStep>(s.noisy[v], place, x); };
+  const auto row = [&](int v, VF(&x)[8]) HWY_ATTR { coefficients(s.noisy[v], place, x); };
   return filter(s, place, row, [&](int i, VF) HWY_ATTR { return wiener_gain(load(s.luma[i] + place), variance); });
 }
 
 /// Empirical Wiener gains of chroma, after those of luma: P is the larger of the pilot's and of a spectrum shaped like
 /// that of the luma. The pilot has lost the fine structure of colour, which mostly lies where luma has its own.
 /// @param luma_shaped  power of that spectrum over the pilot's
-template <int kStep>
 HWY_INLINE VF wiener_chroma(Strip& s, int place, VF variance, float luma_shaped) {
   HWY_ALIGN float square[64 * hn::MaxLanes(Floats())];
   const int n = lanes();
-  const VF sum = pilot_squares<kStep>(s, place, square, n);
+  const VF sum = pilot_squares(s, place, square, n);
   const VF per_luma = hn::Div(hn::Mul(constant(luma_shaped), sum), load(s.luma_power + place));
-  const auto row = [&](int v, VF(&x)[8]) HWY_ATTR { coefficients<kStep>(s.noisy[v], place, x); };
+  const auto row = [&](int v, VF(&x)[8]) HWY_ATTR { coefficients(s.noisy[v], place, x); };
   return filter(s, place, row, [&](int i, VF) HWY_ATTR {
     const VF power = hn::Max(hn::Mul(per_luma, load(s.luma[i] + place)), load(square + i * n));
     return wiener_gain(power, variance);
@@ -295,30 +257,28 @@ HWY_INLINE VF wiener_chroma(Strip& s, int place, VF variance, float luma_shaped)
 }
 
 /// Adds weighted, overlapping blocks to eight rows, through the inverse vertical transform.
-template <int kStep>
-HWY_INLINE void add_columns(const Strip& s, int count, int first_cell, float* const (&rows)[8]) {
-  HWY_ALIGN float row[4 * hn::MaxLanes(Floats())];
+HWY_INLINE void add_columns(const Strip& s, int count, int first_cell, int rows_apart, float* const (&rows)[8]) {
+  HWY_ALIGN float row[2 * hn::MaxLanes(Floats())];
   const int n = lanes();
-  for (int k = 0; k < count + 8 / kStep - 1; k += n) {
-    VF out[8][kStep];
-    for (int j = 0; j < kStep; ++j) {
+  for (int k = 0; k < count + 3; k += n) {
+    VF out[8][2];
+    for (int j = 0; j < 2; ++j) {
       VF x[8];
       for (int v = 0; v < 8; ++v) {
         x[v] = hn::Zero(Floats());
-        for (int m = 0; m < 8 / kStep; ++m) {
-          const int place = lead + k - m, column = j + kStep * m;
-          const VF weight = load(s.weight[window_index<kStep>(column)] + place);
-          x[v] = hn::MulAdd(weight, load(s.value[8 * v + column] + place), x[v]);
+        for (int m = 0; m < 4; ++m) {
+          const int place = lead + k - m;
+          x[v] = hn::MulAdd(load(s.weight + place), load(s.value[8 * v + j + 2 * m] + place), x[v]);
         }
       }
       inverse8(x);
       for (int y = 0; y < 8; ++y) out[y][j] = x[y];
     }
     for (int y = 0; y < 8; ++y) {
-      Interleaved<kStep>::store(out[y], row);
-      float* const to = rows[y] + first_cell + kStep * k;
-      const VF factor = constant(window<kStep>(y));
-      for (int part = 0; part < kStep; ++part) {
+      hn::StoreInterleaved2(out[y][0], out[y][1], Floats(), row);
+      float* const to = rows[y] + first_cell + 2 * k;
+      const VF factor = constant(window(rows_apart, y));
+      for (int part = 0; part < 2; ++part) {
         store(hn::MulAdd(factor, load(row + part * n), load(to + part * n)), to + part * n);
       }
     }

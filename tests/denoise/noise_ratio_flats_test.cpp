@@ -53,9 +53,14 @@ Squares squares_of(const Plane<float>& got, const Mixed& frame, int px) {
   return out;
 }
 
-// The amplitude of the pattern itself is 0 within its standard error, neighbours differ no more across the borders of
-// squares than inside of the noisier ones (20 %: little is left of the noise, in few places), and the mean is the
-// mosaic's.
+/// The difference of neighbours across the borders of squares that is not visible, over that of a single frame's noise.
+double max_border(Level level) {
+  return level == Level::draft ? 0.038 : level == Level::standard ? 0.031 : level == Level::high ? 0.026 : 0.01;
+}
+
+// The amplitude of the pattern itself is 0 within its standard error, neighbours across the borders of squares differ
+// by a few hundredths of the noise (blocks across a border have the mean of its variances, and leave more on its
+// noisier side), and the mean is the mosaic's.
 TEST(NoiseRatioFlats, ShowsNoSquaresInFlats) {
   constexpr int width = 1024, height = 768;
   const Camera camera{.dark_e = {2, 2, 2, 2}};
@@ -68,11 +73,12 @@ TEST(NoiseRatioFlats, ShowsNoSquaresInFlats) {
         if (level == Level::best && blocks != 2) continue;
         const auto got = denoised(frame.both, camera, view_of(&frame.ratio), {.level = level});
         const Squares found = squares_of(got, frame, 8 * blocks);
-        const double edge = std::sqrt(found.across_border_2.mean() / found.inside_2.mean());
-        std::printf("%4.1f e- %2d px %-9s step %+.5f +- %.5f, border over inside %.3f\n", e, 8 * blocks,
-                    std::string(name_of(level)).c_str(), found.step.mean(), found.step.standard_error(), edge);
+        const double border = std::sqrt(found.across_border_2.mean() / (2 * variance_e2));
+        std::printf("%4.1f e- %2d px %-9s step %+.5f +- %.5f, border over noise %.4f, over inside %.3f\n", e,
+                    8 * blocks, std::string(name_of(level)).c_str(), found.step.mean(), found.step.standard_error(),
+                    border, std::sqrt(found.across_border_2.mean() / found.inside_2.mean()));
         EXPECT_LT(std::abs(found.step.mean()), 5 * found.step.standard_error());
-        EXPECT_LT(edge, 1.2);
+        EXPECT_LT(border, max_border(level));
         EXPECT_LT(std::abs(found.value.mean() - e), 5 * mean_error_e);
       }
     }

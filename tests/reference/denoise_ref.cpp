@@ -365,20 +365,21 @@ Pictures both_passes(const Frame& frame, const Image& starts) {
   fill_saturated(frame, x[0]);
   add_coarser(x, variance, frame);
   std::vector<Four> value(frame.levels), residual(frame.levels);
-  const auto pass = [&](const std::vector<Four>* pilot, int stride) {
+  const int rows_apart = frame.options.level >= Level::high ? 2 : 4;
+  const auto pass = [&](const std::vector<Four>* pilot) {
     std::vector<Four> out(frame.levels);
     for (int l = 0; l < frame.levels; ++l) {
-      Shrunk shrunk = shrink(x[l], variance[l], pilot == nullptr ? nullptr : &(*pilot)[l], stride, l, frame.levels);
+      Shrunk shrunk = shrink(x[l], variance[l], pilot == nullptr ? nullptr : &(*pilot)[l], rows_apart, l, frame.levels);
       out[l] = std::move(shrunk.value);
       residual[l] = std::move(shrunk.residual);
     }
     recompose(out, starts);
     value = std::move(out);
   };
-  pass(nullptr, frame.options.level == Level::best ? 2 : 4);
+  pass(nullptr);
   if (frame.options.level != Level::draft) {
     const std::vector<Four> pilot = value;
-    pass(&pilot, frame.options.level == Level::standard ? 4 : 2);
+    pass(&pilot);
   }
   if (frame.options.level == Level::best) {
     const auto finest = static_cast<std::size_t>(std::min(4, frame.levels - 1));

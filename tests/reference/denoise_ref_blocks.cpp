@@ -215,21 +215,21 @@ Block gains(int p, const std::array<Block, 4>& known, const std::array<double, 4
   return gain;
 }
 
-/// Returns the factor of row or column i of a block.
-double window(int i, int stride) {
+/// Returns the factor of row i of a block.
+double window(int i, int rows_apart) {
   constexpr std::array<double, block> rising{2, 2, 5, 5, 5, 5, 2, 2};
-  return stride == 4 ? rising[i] : 1;
+  return rows_apart == 4 ? rising[i] : 1;
 }
 
 }  // namespace
 
-Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride, int level, int levels) {
+Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int rows_apart, int level, int levels) {
   const int w = x[0].width, h = x[0].height;
   Shrunk out;
   Four weight;
   for (Four* four : {&out.value, &out.residual, &weight}) four->fill(Image(w, h));
-  for (int y0 = 0; y0 + block <= h; y0 += stride) {
-    for (int x0 = 0; x0 + block <= w; x0 += stride) {
+  for (int y0 = 0; y0 + block <= h; y0 += rows_apart) {
+    for (int x0 = 0; x0 + block <= w; x0 += 2) {
       std::array<Block, 4> f, of_pilot;
       std::array<double, 4> v{};
       for (int p = 0; p < 4; ++p) {
@@ -249,12 +249,12 @@ Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride
         }
         const Block value = inverse_dct(kept);
         const auto left = denoise::residual_fractions(p == 0 ? denoise::PlaneKind::luma : denoise::PlaneKind::chroma,
-                                                      pilot == nullptr ? 0 : 1, stride, level, levels);
+                                                      pilot == nullptr ? 0 : 1, rows_apart, level, levels);
         const double share = 1 / (v[p] * (level + 1 == levels ? 1 : power));
         const double residual = v[p] * (left.kept * (power - 1) + left.other * (64 - power) + left.mean);
         for (int i = 0; i < block * block; ++i) {
           const int at_x = x0 + i % block, at_y = y0 + i / block;
-          const double part = share * window(i % block, stride) * window(i / block, stride);
+          const double part = share * window(i / block, rows_apart);
           out.value[p].at(at_x, at_y) += part * value[i / block][i % block];
           out.residual[p].at(at_x, at_y) += part * residual;
           weight[p].at(at_x, at_y) += part;

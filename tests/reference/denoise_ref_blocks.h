@@ -32,7 +32,7 @@ struct Shrunk {
   Four residual;  // variance
 };
 
-/// Computes one level of one pass: every block, `stride` apart. `pilot` is null in the first pass.
-Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int stride, int level, int levels);
+/// Computes one level of one pass: with rows of blocks `rows_apart` cells apart. `pilot` is null in the first pass.
+Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int rows_apart, int level, int levels);
 
 }  // namespace lowlux::reference::denoising
