@@ -116,6 +116,7 @@ TEST(CleanPixels, AreWhatDevelopDoes) {
 
 // The mean of four flats of 256 x 256 pixels has a standard error of 0.05 % at 20 e-. The profile's line is the
 // variance of a flat, as for mosaics (TheNoiseProfileIsThatOfTheCleanCodes, whose limits these are).
+// Of LinearRaw more is stated than remains, as luma and chroma of a pixel covary: by 7 % of G, and by 20 % of R and B.
 TEST(CleanPixels, FlatsKeepTheirMeanAndStateTheirNoise) {
   for (const SensorLayout layout : layouts) {
     for (const double mean_e : {20.0, 200.0, 2000.0}) {
@@ -138,7 +139,7 @@ TEST(CleanPixels, FlatsKeepTheirMeanAndStateTheirNoise) {
                            std::to_string(mean_e) + ' ' + std::to_string(c),
                        std::to_string(std::sqrt(stated[c] / measured[c])));
         EXPECT_GT(std::sqrt(stated[c] / measured[c]), layout == SensorLayout::monochrome ? 0.85 : 0.9);
-        EXPECT_LT(std::sqrt(stated[c] / measured[c]), 1.15);
+        EXPECT_LT(std::sqrt(stated[c] / measured[c]), layout == SensorLayout::monochrome ? 1.1 : 1.22);
       }
     }
   }
