@@ -59,7 +59,7 @@ TEST(Methods, WrongCommandsAreRefusedWithAReason) {
                                                    {"a b=p {in} {out}", "not a name"},
                                                    {"../x=p {in} {out}", "not a name"},
                                                    {"dcrow", "did you mean dcraw?"},
-                                                   {"", "ready are dcraw"}};
+                                                   {"", "known methods are dcraw"}};
   for (const auto& [text, reason] : reasons) {
     EXPECT_NE(error_of(text).find(reason), std::string::npos) << text << ": " << error_of(text);
   }
