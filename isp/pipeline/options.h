@@ -84,8 +84,8 @@ struct DevelopOptions {
   std::optional<int> max_size;  // length of the longer side [px], 1 or more; larger images are shrunk in linear light
   BlackRequest black;
   bool estimate_dark = true;  // dark charge that is not known is estimated from the frame itself
-  /// States the dark charge [e-] of each site that another frame of the same series shows: used where the frame itself
-  /// would be examined for it. Estimates of single frames scatter, and one that changes makes frames differ.
+  /// States the dark charge [e-] of each site that another frame of the same series shows, scaled to this one: used in
+  /// place of an estimate. Estimates of single frames scatter, and one that changes makes frames differ.
   std::optional<PerSite<double>> series_dark_e;
   /// Pixels are saturated from the level on that the frame shows, where that is below white, else at white.
   bool find_saturation = true;

@@ -112,8 +112,17 @@ TEST(UnknownDark, OfASeriesIsThatOfItsOtherFrames) {
   EXPECT_EQ(plan.levels.black.dark_mean_e, *options.series_dark_e);
   EXPECT_NEAR(*plan.dark.mean_e, 187.5, 1e-9);
   EXPECT_FALSE(warns(plan));
-  const RawFrame brief = ramp_over_dark(0, 40, 0.001);
-  EXPECT_EQ(planned(brief, options).dark.state, DarkCharge::State::not_expected);
+}
+
+// Frames of a bracket would differ if the charge were left in the short ones: 5 e- are 317 e- after 64 times as long.
+TEST(UnknownDark, OfASeriesIsSubtractedFromShortExposuresToo) {
+  DevelopOptions options;
+  options.series_dark_e = {5, 5, 5, 5};
+  const RawFrame brief = ramp_over_dark(5, 40, 0.05);
+  EXPECT_EQ(planned(brief).dark.state, DarkCharge::State::not_expected);
+  const DevelopPlan plan = planned(brief, options);
+  EXPECT_EQ(plan.dark.state, DarkCharge::State::estimated);
+  EXPECT_EQ(plan.levels.black.dark_mean_e, *options.series_dark_e);
 }
 
 TEST(UnknownDark, GrowsWithTimeAndDoublesEverySevenKelvin) {

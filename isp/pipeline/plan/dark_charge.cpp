@@ -144,15 +144,16 @@ DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, cons
   if (frame.noise->reduced) return {.reason = "noise was reduced before"};
   if (!info.exposure_s) return {.reason = "the exposure time is not known"};
   DarkCharge out{.state = DarkCharge::State::not_expected};
-  if (!(charge_of(high_current_e_per_s, info) >= min_charge_e)) {
-    out.reason = "the exposure was short or the sensor was cold";
-    return out;
-  }
+  // A short exposure is not exempt: the current of the series may be above high_current_e_per_s.
   if (options.series_dark_e) {
     out.state = DarkCharge::State::estimated;
     out.charge_e = out.estimated_e = *options.series_dark_e;
     out.mean_e = mean_of_sites(out.charge_e);
     out.reason = "estimated from another frame of the series";
+    return out;
+  }
+  if (!(charge_of(high_current_e_per_s, info) >= min_charge_e)) {
+    out.reason = "the exposure was short or the sensor was cold";
     return out;
   }
   if (options.estimate_dark) {

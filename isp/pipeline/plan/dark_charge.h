@@ -33,9 +33,10 @@ struct DarkCharge {
 };
 
 /// Finds the dark charge of a frame. Where the black point holds only a pedestal, the gain is known and the exposure
-/// was long, it is estimated from the frame itself (estimate_dark_charge), if `options.estimate_dark`, or
-/// `options.series_dark_e` is used. A significant estimate must also be within 1000 e-/s at 25 C, doubling every 7 C:
-/// three times the highest dark current of the sensors in isp/model/data/sensors.csv.
+/// was long, it is estimated from the frame itself (estimate_dark_charge), if `options.estimate_dark`;
+/// `options.series_dark_e` replaces the estimate, whatever the exposure. A significant estimate must also be within
+/// 1000 e-/s at 25 C, doubling every 7 C: three times the highest dark current of the sensors in
+/// isp/model/data/sensors.csv.
 /// @param thumbnail  dark charge included
 DarkCharge find_dark_charge(const RawFrame& frame, const RawLevels& levels, const Thumbnail& thumbnail,
                             const DevelopOptions& options);
