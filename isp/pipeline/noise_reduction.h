@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -68,6 +69,7 @@ struct NoiseReduction {
   /// Set where each pixel is a cell of its own (pixel_cells.h): the charge of its sites of R, G, B at white [e-], in
   /// which `noise` is stated.
   std::optional<std::array<double, 3>> cell_e;
+  std::array<double, 3> site_part{1, 1, 1};  // charge of a site over that of its pixel
   std::optional<TemporalReduction> temporal;
   std::optional<NoiseRegions> regions;  // set: their levels apply, and `level` does not
   std::vector<std::string> warnings;    // contradictions to the noise model
@@ -78,6 +80,12 @@ struct NoiseReduction {
     return std::ranges::any_of(regions->level, [](const auto& of_region) { return of_region.has_value(); });
   }
   bool reduces() const { return has_level() || temporal; }
+  /// Returns the variance of a pixel of R, G, B without light, as `noise` states it for sites.
+  std::array<double, 3> pixel_variance_e2() const {
+    std::array<double, 3> out = noise.variance_e2;
+    for (std::size_t c = 0; c < 3; ++c) out[c] /= site_part[c];
+    return out;
+  }
 };
 
 /// Returns the level for the signal-to-noise ratio of one pixel: none from 60 on, where no difference is visible; draft

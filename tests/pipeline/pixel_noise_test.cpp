@@ -294,6 +294,18 @@ TEST(PixelNoise, CorrelatedNoiseIsFound) {
   }
 }
 
+// The sites of cells hold parts of a pixel's charge.
+TEST(PixelNoise, WithoutLightIsStatedForPixels) {
+  for (const SensorLayout layout : layouts) {
+    const RawFrame frame = pixel_frame(layout, flat(20, 20, 20), 64, 64, 3);
+    const NoiseReduction noise = plan_develop(frame, options_of(at(Level::draft)), one_thread)->noise_reduction;
+    constexpr double quantisation_e2 = 1 / (12 * pixel_testing::dn_per_e * pixel_testing::dn_per_e);
+    for (const double variance_e2 : noise.pixel_variance_e2()) {
+      EXPECT_NEAR(variance_e2, read_e * read_e + quantisation_e2, 1e-9) << static_cast<int>(layout);
+    }
+  }
+}
+
 TEST(PixelNoise, SaysWhatItDoesNotDo) {
   const RawFrame frame = pixel_frame(SensorLayout::linear_rgb, flat(20, 20, 20), 96, 64, 1);
   RawFrame unknown = pixel_frame(SensorLayout::linear_rgb, flat(20, 20, 20), 96, 64, 1);

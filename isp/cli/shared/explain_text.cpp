@@ -1,3 +1,4 @@
+#include <array>
 #include <cmath>
 #include <span>
 
@@ -14,7 +15,7 @@ namespace {
 
 void add_noise(Lines& out, const isp::NoiseReduction& noise, const std::optional<NoiseOrigin>& origin) {
   if (noise.snr) {
-    const auto& variance = noise.noise.variance_e2;
+    const std::array<double, 3> variance = noise.pixel_variance_e2();
     out.add("noise", origin ? origin_text(*origin) : fmt::format("of the {}", name_of(noise.source)));
     out.add("", fmt::format("without light, with quantisation: {:.3g} {:.3g} {:.3g} e- (R, G, B)",
                             std::sqrt(variance[0]), std::sqrt(variance[1]), std::sqrt(variance[2])));
@@ -177,7 +178,7 @@ std::string dark_text(const isp::DevelopPlan& plan) {
 
 std::string dark_frame_text(const DarkFrame& dark) {
   return fmt::format(
-      "mean of {} exposures{} in {} file{}; adds {:.2g} % to the variance without light; {} pixels unknown",
+      "mean of {} exposures{} in {} file{}; adds {:.3g} % to the variance without light; {} pixels unknown",
       dark.frames, dark.estimated ? " (estimated from the noise)" : "", dark.files, dark.files == 1 ? "" : "s",
       100 * dark.noise_fraction, dark.unknown.size());
 }

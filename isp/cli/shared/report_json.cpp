@@ -108,7 +108,7 @@ Json noise_json(const isp::NoiseReduction& noise, const std::optional<NoiseOrigi
   if (!noise.snr) return json;
   json["snr"] = *noise.snr;
   json["noise_source"] = origin ? name_of(origin->source) : name_of(noise.source);
-  json["variance_e2"] = noise.noise.variance_e2;
+  json["variance_e2"] = noise.pixel_variance_e2();
   json["dark_mean_e"] = noise.noise.dark_mean_e;
   if (noise.noise_ratio) json["noise_ratio_range"] = ratio_range(*noise.noise_ratio);
   json["lines"] = Json::array();

@@ -119,6 +119,7 @@ Result<NoiseReduction> plan_pixel_noise(const RawFrame& frame, const Thumbnail& 
   out.source = frame.noise->source;
   out.noise = cell.noise;
   out.cell_e = cell.cell_e;
+  out.site_part = parts_of(frame.raw);
   out.noise_ratio = frame.noise_ratio;
   out.options.white_gain = balance_of(frame, cell, request);
   std::vector<double> memory;
