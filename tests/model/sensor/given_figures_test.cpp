@@ -90,5 +90,16 @@ TEST(GivenFigures, APixelPitchNeedsAnEfficiencyUnlessTheLuminanceThatFillsAPixel
   EXPECT_TRUE(check(given));
 }
 
+TEST(GivenFigures, AnIsoSpeedContradictsTheLuminanceThatFillsAPixel) {
+  SensorFigures given;
+  given.iso = 100;
+  EXPECT_TRUE(check(given));
+  const auto checked = check(given, "ELD_NikonD850", {2, 10.0});
+  ASSERT_FALSE(checked);
+  EXPECT_TRUE(checked.error().message.starts_with("--iso does nothing with --white-luminance"))
+      << checked.error().message;
+  EXPECT_TRUE(check({}, "ELD_NikonD850", {2, 10.0})) << "the ISO speed of the table is replaced";
+}
+
 }  // namespace
 }  // namespace lowlux::isp
