@@ -265,7 +265,7 @@ void describe(const Job& job, bool estimated, DarkFrame& out) {
     const double zero = *std::ranges::max_element(job.groups[g].fraction_at_zero);
     if (zero > clipped_fraction) {
       out.warnings.push_back(
-          fmt::format("{:.2g} % of the darks' samples are cut off at code 0: their mean is too high", 100 * zero));
+          fmt::format("{:.3g} % of the darks' samples are cut off at code 0: their mean is too high", 100 * zero));
     }
   }
   out.frames = static_cast<int>(std::lround(frames));

@@ -44,7 +44,7 @@ Result<void> check_groups(Groups groups) {
     if (zero > clipped_fraction) {
       return fail(
           ErrorCode::insufficient,
-          fmt::format("{:.2g} % of the samples of {} are at code 0, so their mean is too high; raise the camera's "
+          fmt::format("{:.3g} % of the samples of {} are at code 0, so their mean is too high; raise the camera's "
                       "black level (offset)",
                       100 * zero, what));
     }
@@ -66,7 +66,7 @@ Result<double> excluded_fraction(const PixelMask& mask) {
   const double share = static_cast<double>(excluded) / static_cast<double>(mask.size());
   if (share <= max_excluded) return share;
   return fail(ErrorCode::insufficient,
-              fmt::format("{:.2g} % of the pixels are outliers, at most {:g} % are allowed; are these dark frames?",
+              fmt::format("{:.3g} % of the pixels are outliers, at most {:g} % are allowed; are these dark frames?",
                           100 * share, 100 * max_excluded));
 }
 

@@ -125,7 +125,7 @@ Result<void> check_below_picture(const RawDn& picture, const DarkFrame& dark) {
   const double share = static_cast<double>(count) / static_cast<double>(dark.dn.size());
   if (share <= max_below) return {};
   return fail(ErrorCode::malformed,
-              fmt::format("{:.2g} % of the pixels of the image are more than {:g} standard deviations below the darks, "
+              fmt::format("{:.3g} % of the pixels of the image are more than {:g} standard deviations below the darks, "
                           "at most {:g} % are allowed; light reached the darks, or they are warmer than the image; "
                           "take them again, covered, at the temperature of the image",
                           100 * share, below, 100 * max_below));

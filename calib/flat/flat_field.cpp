@@ -147,18 +147,18 @@ Result<SiteFlat> measure_site(const DarkGroup& flats, const FlatLevels& levels, 
   const double range = *std::ranges::min_element(flats.setting.white_dn) - levels.black_dn[site];
   if (!(out.centre_dn >= min_centre * range)) {
     return unfit(fmt::format(
-        "the flat is too dark: its centre is at {:.2g} % of the range, at least {:g} % are required; expose it longer",
+        "the flat is too dark: its centre is at {:.3g} % of the range, at least {:g} % are required; expose it longer",
         100 * out.centre_dn / range, 100 * min_centre));
   }
   const double least = *std::min_element(out.local.data(), out.local.data() + out.local.size());
   if (!(least >= min_local * out.centre_dn)) {
-    return unfit(fmt::format("the flat falls to {:.2g} % of its centre, at least {:g} % are required; light it evenly",
+    return unfit(fmt::format("the flat falls to {:.3g} % of its centre, at least {:g} % are required; light it evenly",
                              100 * least / out.centre_dn, 100 * min_local));
   }
   out.deviation = deviation_of(out);
   if (out.deviation > max_deviation) {
     return unfit(
-        fmt::format("neighbouring pixels of the flat differ by {:.2g} %, at most {:g} % are allowed; take it of an "
+        fmt::format("neighbouring pixels of the flat differ by {:.3g} %, at most {:g} % are allowed; take it of an "
                     "even surface, out of focus",
                     100 * out.deviation, 100 * max_deviation));
   }
@@ -183,7 +183,7 @@ Result<void> check_not_clipped(const DarkGroup& flats, const FlatLevels& levels)
   const double fraction = static_cast<double>(clipped) / static_cast<double>(flats.mean_dn.size());
   if (fraction <= max_clipped) return {};
   return unfit(
-      fmt::format("{:.2g} % of the pixels of the flat are clipped or nearly clipped, at most {:g} % are allowed; "
+      fmt::format("{:.3g} % of the pixels of the flat are clipped or nearly clipped, at most {:g} % are allowed; "
                   "expose it for about half of the range",
                   100 * fraction, 100 * max_clipped));
 }

@@ -41,7 +41,7 @@ Result<void> check_darks(Pairs darks) {
       }
       if (s.fraction_at_zero <= clipped_fraction) continue;
       return fail(ErrorCode::insufficient,
-                  fmt::format("{:.2g} % of the samples of {} are at code 0, so their noise is cut off; raise the "
+                  fmt::format("{:.3g} % of the samples of {} are at code 0, so their noise is cut off; raise the "
                               "camera's black level (offset)",
                               100 * s.fraction_at_zero, what));
     }

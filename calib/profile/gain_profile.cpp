@@ -281,7 +281,7 @@ Result<void> check_codes(const DarkGroup& group) {
   for (int site = 0; site < 4; ++site) {
     if (group.fraction_at_zero[site] <= clipped_fraction) continue;
     return fail(ErrorCode::insufficient,
-                fmt::format("{:.2g} % of the dark samples are at code 0, so their mean is too high; raise the camera's "
+                fmt::format("{:.3g} % of the dark samples are at code 0, so their mean is too high; raise the camera's "
                             "black level (offset)",
                             100 * group.fraction_at_zero[site]));
   }
@@ -291,7 +291,7 @@ Result<void> check_codes(const DarkGroup& group) {
   const double share = static_cast<double>(at_white) / static_cast<double>(group.mean_dn.size());
   if (share <= max_excluded) return {};
   return fail(ErrorCode::insufficient,
-              fmt::format("{:.2g} % of the dark samples are at the white level {:g} DN; expose "
+              fmt::format("{:.3g} % of the dark samples are at the white level {:g} DN; expose "
                           "less, or cover the lens",
                           100 * share, white));
 }
@@ -327,7 +327,7 @@ Result<BlackFigures> measure_black(const DarkGroup& group, double gain_dn_per_e)
   out.excluded_fraction = 1 - static_cast<double>(out.pixels) / static_cast<double>(mask.size());
   if (out.excluded_fraction <= max_excluded) return out;
   return fail(ErrorCode::insufficient,
-              fmt::format("{:.2g} % of the pixels are outliers, at most {:g} % are allowed; is this a dark frame?",
+              fmt::format("{:.3g} % of the pixels are outliers, at most {:g} % are allowed; is this a dark frame?",
                           100 * out.excluded_fraction, 100 * max_excluded));
 }
 

@@ -221,7 +221,7 @@ void warn_of_saturated_darks(std::span<const DarkGroup> darks, double full_dn, D
           fmt::format("the darks of {} are saturated: dark current is measured without them", setting));
     } else if (full > hot_pixels) {
       out.warnings.push_back(
-          fmt::format("{:.2g} % of the pixels are saturated in the darks of {}, so the mean dark current is too low; "
+          fmt::format("{:.3g} % of the pixels are saturated in the darks of {}, so the mean dark current is too low; "
                       "take shorter darks",
                       100 * full, setting));
     }

@@ -176,7 +176,7 @@ void show_black(const calib::BlackFigures& black, const calib::FrameSetting& set
                           black.frames == 1 ? "" : " of the mean of the frames"));
   out.add("row noise", fmt::format("{:.3g} DN, column noise {:.3g} DN beyond white noise", black.row_noise_dn,
                                    black.column_noise_dn));
-  out.add("pixels", fmt::format("{} in {} frame{}, {:.2g} % of the pixels not used", black.pixels, black.frames,
+  out.add("pixels", fmt::format("{} in {} frame{}, {:.3g} % of the pixels not used", black.pixels, black.frames,
                                 black.frames == 1 ? "" : "s", 100 * black.excluded_fraction));
   out.add("holds", fmt::format("pedestal including dark charge{}: they can be separated with a second exposure time",
                                setting.exposure_s ? fmt::format(", at {:g} s", *setting.exposure_s) : ""));
@@ -201,7 +201,7 @@ void show_dark_series(const calib::DarkSeries& series, std::span<const calib::Da
   Lines out;
   int frames = 0;
   for (const calib::DarkGroup& g : groups) frames += g.frames;
-  out.add("darks", fmt::format("{} frames of {} settings, {:.2g} % of the pixels left out", frames, groups.size(),
+  out.add("darks", fmt::format("{} frames of {} settings, {:.3g} % of the pixels left out", frames, groups.size(),
                                100 * series.excluded_fraction));
   out.add(
       "system gain",

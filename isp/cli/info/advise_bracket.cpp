@@ -83,7 +83,7 @@ std::string exposures_text(const isp::BracketAdvice& advice, const FrameInfo& in
 
 std::string scene_text(const isp::BracketScene& scene) {
   const double above_ev = std::log2(scene.highlight_fraction);
-  std::string out = fmt::format("darkest tenth {:.3g} e- in {}; {:.2g} % of the pixels saturated", scene.darkest_e,
+  std::string out = fmt::format("darkest tenth {:.3g} e- in {}; {:.3g} % of the pixels saturated", scene.darkest_e,
                                 exposure_text(scene.exposure_s), 100 * scene.saturated_fraction);
   if (above_ev <= 0) return out + fmt::format(", brightest lamps {:.1f} EV below saturation", -above_ev);
   return out + fmt::format(", brightest lamps about {:.1f} EV above saturation (extrapolated)", above_ev);
