@@ -172,8 +172,8 @@ std::string assumed_text(const NoiseOrigin& origin, bool is_denoised) {
       fmt::format("the image has {:.2g} times the noise variance expected ({})", origin.prior_ratio, origin.basis);
   if (!is_denoised) return found + ": noise reduction uses the measured noise; --noise GAIN,READ overrides it";
   return found +
-         ", because it was denoised before: noise is not reduced again; --denoise standard reduces the residual noise, "
-         "--noise GAIN,READ states its size";
+         ", because it was denoised before: `develop` does not reduce it again unless --denoise names a level; --noise "
+         "GAIN,READ states its size";
 }
 
 /// Sets the noise that is known of the sensor, adjusted to the image where it is of use.
