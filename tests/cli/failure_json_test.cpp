@@ -34,6 +34,7 @@ class FailureJson : public test::SimulateCommand {
     if (json.is_discarded()) return json;
     const Json& failure = json.is_array() ? json.at(0) : json;
     EXPECT_EQ(failure["ok"], false) << result.out;
+    EXPECT_TRUE(failure.contains("file")) << result.out;
     EXPECT_EQ(failure["where"], where) << result.out;
     EXPECT_FALSE(failure["error"].get<std::string>().empty());
     return json;
@@ -63,6 +64,7 @@ TEST_F(FailureJson, OfVerbsWithOneResultIsAnObject) {
   EXPECT_TRUE(failed({"compare", file("no.png"), file("no.png")}, file("no.png")).is_object());
   EXPECT_TRUE(failed({"retarget", file("no.png"), "-o", file("x.png")}, file("no.png")).is_object());
   EXPECT_TRUE(failed({"calibrate", "black", file("empty"), "-o", file("p.json")}, file("empty")).is_object());
+  EXPECT_TRUE(failed({"capture", "--v4l2=" + file("no"), "-o", file("a.png")}, file("no")).is_object());
   EXPECT_EQ(scratch_.names(), Words{"empty"});
 }
 

@@ -72,7 +72,9 @@ std::string progress_text(const CaptureState& state) {
 
 std::string capture_json(const CaptureState& state, const Error* error) {
   const auto& [stream, count, work, exposure] = state;
-  Json json{{"ok", error == nullptr}};
+  Json json;
+  if (error != nullptr) json["file"] = "";  // there is no input file
+  json["ok"] = error == nullptr;
   if (error != nullptr) {
     json["error"] = error->message;
     json["where"] = error->where;
