@@ -85,13 +85,15 @@ TEST_F(Config, DefaultsThatContradictTheArgumentsAreLeftOut) {
   EXPECT_TRUE(std::filesystem::exists(file("out/n900_dog_small_grbg10in16.jpg")));
 }
 
-// Not known to the parser: isp::check_options finds contradictions of values.
+// Not known to the parser: checks of budgets and profiles, and isp::check_options, find contradictions of values.
 TEST_F(Config, DefaultsThatAValueOfTheArgumentsExcludesAreLeftOut) {
   struct Case {
     const char* lines;
     Words more;
     const char* left;  // defaults that are used
   };
+  const std::string profile = file("camera.json");
+  EXPECT_EQ(run({"calibrate", "quoted", "imx219", "-o", profile}).exit_code, 0);
   for (const Case& c : {Case{"local-tone = 0.5\nquality = 95\n", {"--tone", "none"}, "--quality=95 ("},
                         Case{"brightness = 0.5\nquality = 95\n", {"--space", "linear-srgb"}, "--quality=95 ("},
                         Case{"contrast = 1.2\nquality = 95\n", {"--noise-limit", "2"}, "--quality=95 ("},
@@ -100,6 +102,12 @@ TEST_F(Config, DefaultsThatAValueOfTheArgumentsExcludesAreLeftOut) {
                              "--quality=95 ("},
                         Case{"look = eye\nquality = 95\n", {"--brightness", "0.5"}, "--quality=95 ("},
                         Case{"space = linear-srgb\nquality = 95\n", {"--brightness", "0.5"}, "--quality=95 ("},
+                        Case{"budget-ms = 500\nquality = 95\n", {"--budget-mpps", "1"}, "--quality=95 ("},
+                        Case{"jobs = 2\nquality = 95\n", {"--budget-ms", "5000"}, "--quality=95 ("},
+                        Case{"effects = all\nquality = 95\n", {"--tolerance", "1"}, "--quality=95 ("},
+                        Case{"profile = no.json\nquality = 95\n",
+                             {"--black", profile, "--gain-setting", "analogue gain 1"},
+                             "--quality=95 ("},
                         Case{"brightness = 0.5\ncontrast = 1.2\n", {"--tone", "standard"}, "--brightness=0.5 --con"}}) {
     write(std::string("[develop]\n") + c.lines);
     Words words = c.more;

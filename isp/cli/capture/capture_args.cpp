@@ -92,7 +92,8 @@ void add_source(CLI::App& app, CaptureArgs& args) {
            store_positive(request.analogue_gain, 1e6, "x"));
   app.add_option("--gain-code", args.gain_code,
                  "gain code of the driver, for V4L2 cameras that do not state their gain as a factor")
-      ->type_name("CODE");
+      ->type_name("CODE")
+      ->excludes("--gain");
   add_text(app, "--flip", "h|v|hv",
            "flip the readout of the sensor horizontally, vertically or both (default: the camera's setting)",
            [&request](const std::string& text) -> ArgumentError {
@@ -212,7 +213,6 @@ ArgumentError camera_error(const CaptureArgs& args) {
     return "name one camera: --v4l2 /dev/videoN or --libcamera ID; --list prints the connected cameras";
   }
   if (args.v4l2.empty() && args.gain_code) return "--gain-code is an option of V4L2 cameras";
-  if (args.gain_code && args.request.analogue_gain) return "--gain and --gain-code are mutually exclusive";
   if (const auto checked = capture::check_camera_request(args.request); !checked) return checked.error().message;
   return std::nullopt;
 }

@@ -40,7 +40,8 @@ ArgumentError set_gain_codes(const std::string& text, std::vector<capture::Camer
 }  // namespace
 
 void add_auto_exposure(CLI::App& app, AutoExposureArgs& args) {
-  app.add_flag("--auto-exposure", args.wanted, "set exposure time and gain for the best signal-to-noise ratio");
+  app.add_flag("--auto-exposure", args.wanted, "set exposure time and gain for the best signal-to-noise ratio")
+      ->excludes("--exposure-time");
   add_text(app, "--max-exposure", "S", "with --auto-exposure: longest exposure time (default: one frame period)",
            store_within({min_exposure_s, max_exposure_s, "s"}, args.longest_s));
   add_text(app, "--max-gain", "X", "with --auto-exposure: largest analogue gain (default: the camera's)",
@@ -54,7 +55,9 @@ void add_auto_exposure(CLI::App& app, AutoExposureArgs& args) {
            "with --auto-exposure: largest fraction of clipped pixels in the brightest channel (default 0.001)",
            store_within({1e-9, 0.5}, args.clipped_fraction));
   add_text(app, "--gain-codes", "CODE=X,...", "with --auto-exposure: gain codes of a V4L2 camera and their factors",
-           [&args](const std::string& text) { return set_gain_codes(text, args.gain_codes); });
+           [&args](const std::string& text) { return set_gain_codes(text, args.gain_codes); })
+      ->excludes("--gain")
+      ->excludes("--gain-code");
 }
 
 std::optional<std::string> auto_exposure_error(const CLI::App& app, const AutoExposureArgs& args) {
@@ -65,11 +68,8 @@ std::optional<std::string> auto_exposure_error(const CLI::App& app, const AutoEx
     if (given == of_automatic.end()) return std::nullopt;
     return fmt::format("{} requires --auto-exposure", *given);
   }
-  if (app.count("--exposure-time") > 0) return "--auto-exposure and --exposure-time are mutually exclusive";
-  if (args.gain_codes.empty()) return std::nullopt;
-  if (app.count("--v4l2") == 0) return "--gain-codes is an option of V4L2 cameras; libcamera states factors";
-  for (const char* const option : {"--gain", "--gain-code"}) {
-    if (app.count(option) > 0) return fmt::format("--gain-codes and {} are mutually exclusive", option);
+  if (!args.gain_codes.empty() && app.count("--v4l2") == 0) {
+    return "--gain-codes is an option of V4L2 cameras; libcamera states factors";
   }
   return std::nullopt;
 }

@@ -74,6 +74,14 @@ Parsed<DevelopArgs> parse_batch(CLI::App& app, const std::vector<std::string>& w
   return parsed;
 }
 
+/// Completes budget and tolerance. Returns what is wrong with them.
+std::optional<std::string> complete_budget(DevelopArgs& args) {
+  if (auto wrong = complete_effects(args.look, args.effects)) return wrong;
+  if (args.effects.budgeted() && args.jobs > 1)
+    return "--jobs cannot be combined with a time budget, which requires one file at a time";
+  return std::nullopt;
+}
+
 constexpr const char *develop_summary = "Develops raw files to images.", *develop_name = "lowlux develop";
 
 /// Adds all options of `develop`.
@@ -117,7 +125,8 @@ std::set<std::string> excluded_by(const std::vector<std::string>& words, const D
     CLI::App app(develop_summary, develop_name);
     DevelopArgs args;
     add_develop(app, args);
-    return !parse_arguments(app, words, &args.defaults, left_out) && contradicts(args);
+    if (parse_arguments(app, words, &args.defaults, left_out)) return false;
+    return profile_option_error(args) || complete_budget(args) || contradicts(args);
   });
 }
 
@@ -133,11 +142,8 @@ Parsed<DevelopArgs> parse_develop_without(const std::set<std::string>& left_out,
     if (const auto wrong = complete_look(good->look, Planner::of_everything, good->options.look)) {
       return refuse(app, *wrong);
     }
-    if (const auto wrong = complete_effects(good->look, good->effects)) return refuse(app, *wrong);
+    if (const auto wrong = complete_budget(*good)) return refuse(app, *wrong);
     if (const auto wrong = settle_merging(good->merging, good->effects.budgeted())) return refuse(app, *wrong);
-    if (good->effects.budgeted() && good->jobs > 1) {
-      return refuse(app, "--jobs cannot be combined with a time budget, which requires one file at a time");
-    }
   }
   return parsed;
 }
@@ -152,11 +158,11 @@ const Names<isp::DngCompression>& compression_names() {
 
 Parsed<DevelopArgs> parse_develop(const std::vector<std::string>& words,
                                   const std::function<bool(const DevelopArgs&)>& contradicts) {
-  Parsed<DevelopArgs> parsed = parse_develop_without({}, words);
-  const auto* const good = std::get_if<DevelopArgs>(&parsed);
-  const std::set<std::string> excluded =
-      good != nullptr ? excluded_by(words, good->defaults, contradicts) : std::set<std::string>();
-  return excluded.empty() ? parsed : parse_develop_without(excluded, words);
+  CLI::App app(develop_summary, develop_name);
+  DevelopArgs args;
+  add_develop(app, args);
+  if (const auto code = parse_arguments(app, words, &args.defaults)) return *code;
+  return parse_develop_without(excluded_by(words, args.defaults, contradicts), words);
 }
 
 Parsed<DevelopArgs> parse_denoise(const std::vector<std::string>& words) {

@@ -219,11 +219,11 @@ void add_budget(CLI::App& app, EffectsArgs& args) {
            store_within(budget_ms_range, args.budget_ms));
   add_text(app, "--budget-mpps", "MP_PER_S", "time limit for each frame, as a speed in megapixels per second",
            store_within(budget_mpps_range, args.budget_mpps));
+  app.get_option("--budget-mpps")->excludes(app.get_option("--budget-ms"));
 }
 
 std::optional<std::string> complete_effects(const LookArgs& look, EffectsArgs& args) {
   using Which = isp::LookChoice::Which;
-  if (args.budget_ms && args.budget_mpps) return "--budget-ms and --budget-mpps are mutually exclusive";
   const bool all = look.choice.which == Which::all;
   if (all && is_given(look, "--tolerance")) return "--tolerance requires --effects auto";
   if (all && args.budgeted()) return "a time budget requires --effects auto";

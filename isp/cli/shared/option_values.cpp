@@ -229,6 +229,10 @@ std::string error_text(const CLI::ParseError& error) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   const std::size_t repeated = text.find(": At Most 1 required but received ");
   if (repeated != std::string::npos) return text.substr(0, repeated) + " is given more than once";
+  constexpr std::string_view excludes = " excludes ";
+  if (const std::size_t both = text.find(excludes); both != std::string::npos) {
+    return text.replace(both, excludes.size(), " and ") + " are mutually exclusive";
+  }
   constexpr std::string_view value = ": Value ", outside = " not in range ";
   const std::size_t before = text.find(value), after = text.find(outside);
   if (before < after && after != std::string::npos) {
