@@ -247,7 +247,7 @@ TEST(NoiseReduction, RowNoiseIsTakenOffWhereItStandsOut) {
 
 bool warns_of_rows(const DevelopPlan& plan) {
   return std::ranges::any_of(plan.warnings, [](const std::string& warning) {
-    return warning.starts_with("rows differ by ") && warning.find("are not corrected") != std::string::npos;
+    return warning.starts_with("rows have offsets of ") && warning.find("are not corrected") != std::string::npos;
   });
 }
 
