@@ -22,7 +22,7 @@ LOWLUX_FUZZ_TARGET(options)(const std::uint8_t* data, std::size_t size) {
     for (const double number : *numbers) require(std::isfinite(number));
   }
   std::string joined;
-  for (const std::string& word : lowlux::cli::words_of(text)) {
+  for (const std::string& word : lowlux::cli::split_at_commas(text)) {
     require(word.find(',') == std::string::npos);
     joined += word;
   }
