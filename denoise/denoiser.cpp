@@ -318,6 +318,7 @@ void Run::unpack(const PlaneSet& planes, PlaneView<float> signal_e, const Denois
         in.variance_e2[k] = static_cast<float>(noise.variance_e2[k]);
       }
       in.red_is_odd = red_column(raw.phase) == 1;
+      in.sites_coincide = options.sites_coincide;
       const LumaRows luma = luma_rows(planes, y, rows);
       in.neighbour_luma[0] = luma.above;
       in.neighbour_luma[1] = luma.below;

@@ -153,6 +153,7 @@ struct UnpackRow {
   float rho;  // < 0: no prior
   float per_gain[3];
   bool red_is_odd;
+  bool sites_coincide;             // both greens of a cell are one value
   const float* neighbour_luma[2];  // rows above and below
   Slopes slopes;
   float offset_e;  // offset of the stabiliser

@@ -28,6 +28,30 @@ HWY_INLINE SiteValues values_of(VF luma, VF chroma1, VF chroma2, VF chroma3) {
   return {{hn::Add(half, skew), hn::Add(green, maze), hn::Sub(green, maze), hn::Sub(half, skew)}};
 }
 
+/// Returns the fraction of a stabilised value over the offset of light, and the raw variance there [e-^2].
+struct RawVariance {
+  VF fraction, e2;
+};
+HWY_INLINE RawVariance raw_variance(const UnpackRow& in, int k, VF u) {
+  const VF fraction = light_of(u), light = hn::Mul(constant(in.offset_e * in.per_gain[k]), fraction);
+  const VF raw = hn::Max(hn::Add(light, constant(in.dark_e[k])), constant(in.min_e[k]));
+  return {fraction, hn::Div(hn::Add(raw, constant(in.variance_e2[k])), hn::Add(constant(1), fraction))};
+}
+
+/// Returns the covariance of what remains of the noise of L and C1, of the variances `own` and `left`, in cells whose
+/// greens are one value: its correlation is that of L = (R + 3 G + B) / 5 and C1 = (R + B) / 2 - G.
+HWY_INLINE VF covariance(const UnpackRow& in, const SiteValues& at, VF own, VF left) {
+  const auto stabilised = [&](int k, int site) HWY_ATTR {
+    const VF u = hn::Mul(constant(1 / in.offset_e), at.u[site]);
+    return hn::Mul(constant(1 / (in.per_gain[k] * in.per_gain[k])), raw_variance(in, k, u).e2);
+  };
+  const VF others = hn::Add(stabilised(0, 0), stabilised(2, 3)), green = hn::Mul(constant(0.5f), stabilised(1, 1));
+  const VF of_luma = hn::MulAdd(constant(0.04f), others, hn::Mul(constant(0.36f), green));
+  const VF of_chroma = hn::MulAdd(constant(0.25f), others, green);
+  const VF common = hn::MulAdd(constant(0.1f), others, hn::Mul(constant(-0.6f), green));
+  return hn::Mul(common, hn::Sqrt(hn::Div(hn::Mul(own, left), hn::Mul(of_luma, of_chroma))));
+}
+
 /// Computes the remaining variance of the luma's light, and in R, G and B from that in C1 and C2.
 HWY_INLINE void light_variances(const UnpackRow& in, const UnpackedRow& out, int i, VF luma, const SiteValues& at,
                                 const VF (&left)[4]) {
@@ -37,8 +61,15 @@ HWY_INLINE void light_variances(const UnpackRow& in, const UnpackedRow& out, int
     return hn::Mul(hn::Mul(slope, slope), variance);
   };
   store(of_light(luma, own), out.luma_variance_e2 + i);
-  const VF other = hn::MulAdd(constant(0.5f), left[2], hn::MulAdd(constant(0.36f), left[1], own));
-  const VF green = hn::MulAdd(constant(0.25f), left[3], hn::MulAdd(constant(0.16f), left[1], own));
+  VF other = hn::MulAdd(constant(0.5f), left[2], hn::MulAdd(constant(0.36f), left[1], own));
+  VF green = hn::MulAdd(constant(0.16f), left[1], own);
+  if (in.sites_coincide) {
+    const VF common = covariance(in, at, own, left[1]);
+    other = hn::MulAdd(constant(1.2f), common, other);
+    green = hn::MulAdd(constant(-0.8f), common, green);
+  } else {
+    green = hn::MulAdd(constant(0.25f), left[3], green);
+  }
   const VF of_colour[3] = {other, green, other};
   const VF value[3] = {at.u[0], hn::Mul(constant(0.5f), hn::Add(at.u[1], at.u[2])), at.u[3]};
   for (int k = 0; k < 3; ++k) {
@@ -50,11 +81,10 @@ HWY_INLINE void light_variances(const UnpackRow& in, const UnpackedRow& out, int
 /// Returns the light of stabilised values of colour k in electrons, white balance undone. The mean of the noise that
 /// was removed is added, which is `removed` times the variance of RawNoise.
 HWY_INLINE VF light_e(const UnpackRow& in, int k, VF value, VF removed) {
-  const VF u = hn::Mul(constant(1 / in.offset_e), value), fraction = light_of(u);
-  const VF light = hn::Mul(constant(in.offset_e * in.per_gain[k]), fraction);
-  const VF raw = hn::Max(hn::Add(light, constant(in.dark_e[k])), constant(in.min_e[k]));
-  const VF variance = hn::Div(hn::Add(raw, constant(in.variance_e2[k])), hn::Add(constant(1), fraction));
-  const VF mean = hn::Mul(constant(0.25f / (in.offset_e * in.per_gain[k])), hn::Mul(removed, variance));
+  const VF u = hn::Mul(constant(1 / in.offset_e), value);
+  const RawVariance variance = raw_variance(in, k, u);
+  const VF light = hn::Mul(constant(in.offset_e * in.per_gain[k]), variance.fraction);
+  const VF mean = hn::Mul(constant(0.25f / (in.offset_e * in.per_gain[k])), hn::Mul(removed, variance.e2));
   return hn::Add(light, hn::IfThenElseZero(hn::Gt(u, constant(linear_value)), mean));
 }
 

@@ -74,6 +74,25 @@ TEST(Denoiser, AgreesWithTheReferenceWhereNoiseIsNotWhite) {
   }
 }
 
+// Both greens are one value, whose variance is half of what one of two would have. Level::best chooses among patches
+// that are nearly equal, where rounding decides: NlBayesAgainstReference compares it.
+TEST(Denoiser, AgreesWithTheReferenceWhereSitesCoincide) {
+  const Camera camera{.phase = BayerPhase::rggb, .dark_e = {2, 2, 2, 2}};
+  Plane<float> raw = exposed(camera, waves(20), 300, 200, 15);
+  for (int y = 0; y < 200; y += 2) {
+    for (int x = 0; x < 300; x += 2) {
+      raw.at(x + 1, y) = raw.at(x, y + 1) = (raw.at(x + 1, y) + raw.at(x, y + 1)) / 2;
+    }
+  }
+  for (const Level level : {Level::draft, Level::standard, Level::high}) {
+    for (const double blue : {0.5, 1.4}) {
+      SCOPED_TRACE(std::string(name_of(level)) + ' ' + std::to_string(blue));
+      compare(camera, raw,
+              {.level = level, .white_gain = {0.8, 1, blue}, .sites_coincide = true, .keep_point_sources = false});
+    }
+  }
+}
+
 // Twice the noise on all levels is twice the variance: gain 2 on values and variances is the same as no gain.
 TEST(Denoiser, TakesOneScaleOfAllLevelsForThatOfTheNoise) {
   const Camera camera{.dark_e = {0, 0, 0, 0}, .read_noise_e = 6};

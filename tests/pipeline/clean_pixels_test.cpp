@@ -116,32 +116,36 @@ TEST(CleanPixels, AreWhatDevelopDoes) {
 
 // The mean of four flats of 256 x 256 pixels has a standard error of 0.05 % at 20 e-. The profile's line is the
 // variance of a flat, as for mosaics (TheNoiseProfileIsThatOfTheCleanCodes, whose limits these are).
-// Of LinearRaw more is stated than remains, as luma and chroma of a pixel covary: by 7 % of G, and by 20 % of R and B.
 TEST(CleanPixels, FlatsKeepTheirMeanAndStateTheirNoise) {
-  for (const SensorLayout layout : layouts) {
-    for (const double mean_e : {20.0, 200.0, 2000.0}) {
-      std::array<double, 3> mean{}, measured{}, stated{};
-      for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-        const RawFrame clean =
-            cleaned(pixel_frame(layout, flat(mean_e, mean_e, mean_e), 272, 272, 30 + seed), Level::draft);
-        for (int c = 0; c < planes_of(clean.raw); ++c) {
-          const auto [mean_of_one, variance] = moments(clean, c, 8);
-          const double x = mean_e / full_e;
-          mean[c] += mean_of_one / 4;
-          measured[c] += variance;
-          stated[c] += (clean.noise->scale[c] * x + clean.noise->offset[c]) * full_e * full_e;
-        }
-      }
-      for (int c = 0; c < (layout == SensorLayout::monochrome ? 1 : 3); ++c) {
-        SCOPED_TRACE(std::to_string(static_cast<int>(layout)) + ' ' + std::to_string(mean_e) + ' ' + std::to_string(c));
-        EXPECT_NEAR(mean[c] / mean_e, 1, 0.002);
-        RecordProperty("stated over measured " + std::to_string(static_cast<int>(layout)) + ' ' +
-                           std::to_string(mean_e) + ' ' + std::to_string(c),
-                       std::to_string(std::sqrt(stated[c] / measured[c])));
-        EXPECT_GT(std::sqrt(stated[c] / measured[c]), layout == SensorLayout::monochrome ? 0.85 : 0.9);
-        EXPECT_LT(std::sqrt(stated[c] / measured[c]), layout == SensorLayout::monochrome ? 1.1 : 1.22);
+  const auto check = [](SensorLayout layout, const std::array<double, 3>& mean_e, Level level) {
+    std::array<double, 3> mean{}, measured{}, stated{};
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+      const RawFrame clean =
+          cleaned(pixel_frame(layout, flat(mean_e[0], mean_e[1], mean_e[2]), 272, 272, 30 + seed), level);
+      for (int c = 0; c < planes_of(clean.raw); ++c) {
+        const auto [mean_of_one, variance] = moments(clean, c, 8);
+        mean[c] += mean_of_one / 4;
+        measured[c] += variance;
+        stated[c] += (clean.noise->scale[c] * mean_e[c] / full_e + clean.noise->offset[c]) * full_e * full_e;
       }
     }
+    const bool monochrome = layout == SensorLayout::monochrome;
+    for (int c = 0; c < (monochrome ? 1 : 3); ++c) {
+      const std::string what = std::string(denoise::name_of(level)) + (monochrome ? " monochrome " : " ") +
+                               std::to_string(mean_e[0]) + ' ' + std::to_string(c);
+      EXPECT_NEAR(mean[c] / mean_e[c], 1, 0.002) << what;
+      const double ratio = std::sqrt(stated[c] / measured[c]);
+      RecordProperty("stated over measured " + what, std::to_string(ratio));
+      EXPECT_GT(ratio, monochrome ? 0.85 : 0.9) << what;
+      EXPECT_LT(ratio, 1.1) << what;
+    }
+  };
+  for (const SensorLayout layout : layouts) {
+    for (const double mean_e : {20.0, 200.0, 2000.0}) check(layout, {mean_e, mean_e, mean_e}, Level::draft);
+  }
+  check(SensorLayout::linear_rgb, {100, 200, 50}, Level::draft);
+  for (const Level level : {Level::standard, Level::high, Level::best}) {
+    check(SensorLayout::linear_rgb, {200, 200, 200}, level);
   }
 }
 

@@ -114,6 +114,14 @@ struct Frame {
            (1 + std::max(x / offset_e, -0.5));
   }
 
+  /// Returns the correlation of the noise of L = (R + 3 G + B) / 5 and C1 = (R + B) / 2 - G where both greens are one
+  /// value.
+  double correlation(const std::array<double, 4>& u) const {
+    const auto of_site = [&](int k) { return variance_of(k, light(u[k]) / gain[k] + dark_e[k]); };
+    const double r = of_site(0), g = of_site(1) / 2, b = of_site(3);
+    return (0.1 * (r + b) - 0.6 * g) / std::sqrt((0.04 * (r + b) + 0.36 * g) * (0.25 * (r + b) + g));
+  }
+
   /// Returns the chroma start level at each tile.
   Image starts() const {
     Image out(tiles_of(columns), tiles_of(rows));
@@ -291,8 +299,10 @@ void add_coarser(std::vector<Four>& x, std::vector<Four>& variance, const Frame&
 /// Returns the harmonic mean of two steps of one sign, else 0.
 double slope(double before, double after) { return before * after > 0 ? 2 * before * after / (before + after) : 0; }
 
-/// Adds to C2 and C3 `sign` times the effect of the luma's slopes, over the cells of the frame; mirrored beyond.
+/// Adds to C2 and C3 `sign` times the effect of the luma's slopes, over the cells of the frame; mirrored beyond. There
+/// is none where the sites of a cell coincide.
 void add_slopes(const Frame& frame, double sign, const Image& luma, Four& planes) {
+  if (frame.options.sites_coincide) return;
   const double sx = red_column(frame.raw.phase) == 0 ? -1 : 1, sy = red_row(frame.raw.phase) == 0 ? -1 : 1;
   const auto at = [&](int x, int y) {
     return luma.at(std::clamp(x, 0, frame.columns - 1), std::clamp(y, 0, frame.rows - 1));
@@ -438,9 +448,15 @@ Denoised denoise(const RawElectronsView& raw, const RawNoise& noise, const Denoi
       }
       const double kept = p.residual[0].at(cx, cy);
       out.residual_variance.at(cx, cy) = std::pow(frame.slope(luma), 2) * kept;
-      const std::array<double, 3> of_colour{kept + 0.36 * left[1] + 0.5 * left[2],
-                                            kept + 0.16 * left[1] + 0.25 * left[3],
-                                            kept + 0.36 * left[1] + 0.5 * left[2]};
+      double other = kept + 0.36 * left[1] + 0.5 * left[2], green = kept + 0.16 * left[1];
+      if (options.sites_coincide) {
+        const double common = frame.correlation(u) * std::sqrt(kept * left[1]);  // covariance of L and C1
+        other += 1.2 * common;
+        green -= 0.8 * common;
+      } else {
+        green += 0.25 * left[3];
+      }
+      const std::array<double, 3> of_colour{other, green, other};
       const std::array<double, 3> at{u[0], (u[1] + u[2]) / 2, u[3]};
       for (int k = 0; k < 3; ++k) {
         out.site_variance[k].at(cx, cy) = std::pow(frame.slope(at[k]) / frame.options.white_gain[k], 2) * of_colour[k];
