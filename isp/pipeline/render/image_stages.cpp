@@ -177,7 +177,7 @@ ImageStages::Light ImageStages::look(const RgbInput& in, const RawFrame& frame, 
                                      const NoiseMaps& maps) {
   if (needs_grid(plan) || needs_noise(plan) || needs_seeing_map(plan)) measure_cells(in, frame, plan, maps);
   RgbTransform transform = plan.rendering.transform;
-  if (needs_grid(plan)) transform.look = look_grid(plan);
+  if (needs_grid(plan)) transform.look = look_grid(frame.raw.default_crop, plan);
   seeing_.reset();
   if (needs_seeing_map(plan)) map_seeing_of(plan);
   if (needs_table(plan)) return {through_table(in, plan), transform_of_light(plan, transform.look)};
@@ -185,7 +185,7 @@ ImageStages::Light ImageStages::look(const RgbInput& in, const RawFrame& frame, 
   return {in, transform};
 }
 
-const LookGrid* ImageStages::look_grid(const DevelopPlan& plan) {
+const LookGrid* ImageStages::look_grid(const Rect& crop, const DevelopPlan& plan) {
   if (!look_ || look_width_ < plan.width || look_height_ < plan.height) {
     look_width_ = std::max(plan.width, look_width_);
     look_height_ = std::max(plan.height, look_height_);
@@ -195,6 +195,11 @@ const LookGrid* ImageStages::look_grid(const DevelopPlan& plan) {
   std::optional<NoiseLimit> limit;
   if (bounds_noise(plan)) {
     limit = {*plan.rendering.look->noise_limit, plan.rendering.limit, luminance_noise_.view()};
+    if (plan.noise_reduction.has_level()) {
+      lowlux::fit(plain_noise_, luminance_noise_.width(), luminance_noise_.height());
+      noise_of_plain_areas(plan, crop, quarter_view(), luminance_noise_.view(), plain_noise_.view(), executor_);
+      limit->variance = plain_noise_.view();
+    }
   }
   const RgbTransform& transform = plan.rendering.transform;
   grid_ = look_->make(quarter_view(), transform.matrix, transform.clip, plan.rendering.look->look, limit, executor_);

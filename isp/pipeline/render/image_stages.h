@@ -60,7 +60,7 @@ class ImageStages {
   void measure_cells(const RgbInput& in, const RawFrame& frame, const DevelopPlan& plan, const NoiseMaps& maps);
   RgbView<const float> quarter_view() const;
   void map_seeing_of(const DevelopPlan& plan);
-  const LookGrid* look_grid(const DevelopPlan& plan);
+  const LookGrid* look_grid(const Rect& crop, const DevelopPlan& plan);
   CameraPlanes through_table(const RgbInput& in, const DevelopPlan& plan);
   CameraPlanes through_profile(const RgbInput& in, const DevelopPlan& plan);
 
@@ -72,6 +72,7 @@ class ImageStages {
   std::array<Plane<float>, 3> modelled_;  // light as changed by a model of appearance or a profile
   std::array<Plane<float>, 3> quarter_;   // for the look: means of 4 x 4 pixels
   Plane<float> luminance_noise_;          // variance, for the cells of quarter_
+  Plane<float> plain_noise_;              // luminance_noise_ as it is in plain areas
   Plane<float> signal_to_noise_;          // for the cells of quarter_
   std::unique_ptr<NightLookGrid> look_;
   int look_width_ = 0;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "isp/base/cfa.h"
 #include "isp/base/look_grid.h"
@@ -85,6 +87,43 @@ void of_model(const DevelopPlan& plan, const Rect& crop, const NoiseProfile& noi
   });
 }
 
+/// Logarithms of light and of the noise variance, to the base of 2.
+struct LightAndNoise {
+  float light, variance;
+};
+
+/// Returns medians of groups in the order of their light, of 64 cells and half a stop at least. The last cells, which
+/// are fewer or more alike, belong to the group before them.
+std::vector<LightAndNoise> medians_by_light(std::vector<LightAndNoise> cells) {
+  constexpr std::ptrdiff_t min_cells = 64;
+  constexpr float min_stops = 0.5f;
+  const auto by_light = [](const LightAndNoise& a, const LightAndNoise& b) { return a.light < b.light; };
+  const auto by_noise = [](const LightAndNoise& a, const LightAndNoise& b) { return a.variance < b.variance; };
+  std::sort(cells.begin(), cells.end(), by_light);
+  std::vector<LightAndNoise> out;
+  for (auto first = cells.begin(); first != cells.end();) {
+    auto last = cells.end() - first < min_cells ? cells.end() : first + min_cells;
+    while (last != cells.end() && last->light < first->light + min_stops) ++last;
+    if (cells.end() - last < min_cells || cells.back().light < last->light + min_stops) last = cells.end();
+    const auto middle = first + (last - first) / 2;
+    const float light = middle->light;
+    std::nth_element(first, middle, last, by_noise);
+    out.push_back({light, middle->variance});
+    first = last;
+  }
+  return out;
+}
+
+/// Interpolates between the medians, and keeps the first and the last beyond them.
+float noise_at(const std::vector<LightAndNoise>& medians, float light) {
+  const auto after = std::upper_bound(medians.begin(), medians.end(), light,
+                                      [](float value, const LightAndNoise& median) { return value < median.light; });
+  if (after == medians.begin()) return after->variance;
+  const LightAndNoise& low = after[-1];
+  if (after == medians.end()) return low.variance;
+  return low.variance + (light - low.light) / (after->light - low.light) * (after->variance - low.variance);
+}
+
 }  // namespace
 
 std::array<float, 3> luminance_of_camera(const DevelopPlan& plan) {
@@ -104,6 +143,36 @@ void noise_of_luminance(const DevelopPlan& plan, const RawFrame& frame, const No
     const RawDn& raw = frame.raw;
     of_model(plan, raw.default_crop, profile_of_light(plan, *frame.noise, raw.phase), quarter, out, executor);
   }
+}
+
+void noise_of_plain_areas(const DevelopPlan& plan, const Rect& crop, const RgbView<const float>& quarter,
+                          PlaneView<const float> variance, PlaneView<float> out, Executor& executor) {
+  const NoiseRatioView ratio = view_of(plan.noise_reduction.noise_ratio.get()).from(crop.x, crop.y);
+  const int side = plan.options.half ? 8 : 4;  // side of a cell of the grid, in pixels of the mosaic
+  const std::array<float, 3> weights = luminance_of_camera(plan);
+  const auto log_light = [&](int x, int y) {
+    float light = 0;
+    for (std::size_t c = 0; c < 3; ++c) light += weights[c] * quarter[c].row(y)[x];
+    return light > 1e-9f ? std::log2(std::min(light, 1e9f)) : -30;  // also if it is not a number
+  };
+  const auto ratio_at = [&](int x, int y) { return static_cast<float>(ratio.mean(side * x, side * y, side, side)); };
+  constexpr int max_along = 256;  // cells that are read along each side: their medians are exact enough
+  const int step_x = (out.width + max_along - 1) / max_along, step_y = (out.height + max_along - 1) / max_along;
+  std::vector<LightAndNoise> cells;
+  for (int y = step_y / 2; y < out.height; y += step_y) {
+    for (int x = step_x / 2; x < out.width; x += step_x) {
+      const float plain = variance.row(y)[x] / ratio_at(x, y);
+      if (plain > 0 && plain < 1e30f) cells.push_back({log_light(x, y), std::log2(plain)});
+    }
+  }
+  const std::vector<LightAndNoise> medians = medians_by_light(std::move(cells));
+  for_each_band(executor, out.height, [&](RowBand band, int) {
+    for (int y = band.first; y < band.last; ++y) {
+      for (int x = 0; x < out.width; ++x) {
+        out.row(y)[x] = medians.empty() ? 0 : ratio_at(x, y) * std::exp2(noise_at(medians, log_light(x, y)));
+      }
+    }
+  });
 }
 
 void signal_to_noise(const DevelopPlan& plan, const RgbView<const float>& quarter, PlaneView<const float> variance,

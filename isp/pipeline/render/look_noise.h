@@ -17,6 +17,14 @@ namespace lowlux::isp {
 void noise_of_luminance(const DevelopPlan& plan, const RawFrame& frame, const NoiseMaps& maps,
                         const RgbView<const float>& quarter, PlaneView<float> out, Executor& executor);
 
+/// Computes what the variance of each cell is in plain areas of its light: the median over cells of the frame that have
+/// as much light, times the noise ratio. What noise reduction predicts for a cell scatters with the few coefficients
+/// that passed there, and is larger at edges, in texture and along the border of the frame.
+/// @param variance  result of noise_of_luminance
+/// @param out  as `variance`
+void noise_of_plain_areas(const DevelopPlan& plan, const Rect& crop, const RgbView<const float>& quarter,
+                          PlaneView<const float> variance, PlaneView<float> out, Executor& executor);
+
 /// Returns the luminance of a unit of each channel of white-balanced camera RGB, in the unit of
 /// plan.rendering.transform.
 std::array<float, 3> luminance_of_camera(const DevelopPlan& plan);

@@ -276,10 +276,12 @@ void NightLookGrid::State::add_detail_noise(Executor& executor) {
   });
 }
 
-// Computes the gain limit on cells of 64 pixels: gain rises with the square of the light, and in smaller cells would
-// amplify their remaining noise.
+// Computes the gain limit on cells of 64 pixels and more, from coarse to fine: gain rises with the square of the light,
+// and would triple the noise that means of cells have. A cell's own gain counts only where it differs from that of the
+// coarser cells by more than such noise: by 0.2 in its logarithm, and in full from 0.4 on. The noise follows the cube
+// root of the gain, and changes by at most 7 %, less than the margin of gain_within_noise_limit.
 void NightLookGrid::State::bound_noise(const NoiseLimit& limit, Executor& executor) {
-  const int level = std::min(4, levels - 1);
+  const int finest = std::min(4, levels - 1);
   const PlaneView<float> e = between[0], v = variance[0];
   for_each_row(executor, e.height, [&](int y) {
     std::copy_n(seen[0].row(y), e.width, e.row(y));
@@ -288,19 +290,33 @@ void NightLookGrid::State::bound_noise(const NoiseLimit& limit, Executor& execut
       v.row(y)[x] = noise >= 0 && noise < 1e9f ? noise : 0.0f;
     }
   });
-  between.halve_to(level, executor);
-  variance.halve_to(level, executor);
-  const PlaneView<float> light = between[level], noise = variance[level];
-  for_each_row(executor, light.height, [&](int y) {
-    for (int x = 0; x < light.width; ++x) {
-      light.row(y)[x] = gain_within_noise_limit(limit.display_per_unit * light.row(y)[x],
-                                                limit.display_per_unit * std::sqrt(noise.row(y)[x]), limit.lightness);
-    }
+  between.halve_to(levels - 1, executor);
+  variance.halve_to(levels - 1, executor);
+  Pyramid& gain = photopic;  // logarithms
+  for (int k = levels - 1; k >= finest; --k) {
+    const PlaneView<float> light = between[k], noise = variance[k], log_gain = gain[k];
+    const bool is_coarsest = k == levels - 1;
+    if (!is_coarsest) interpolate_twice(gain[k + 1], log_gain, executor);
+    for_each_row(executor, light.height, [&](int y) {
+      for (int x = 0; x < light.width; ++x) {
+        const double on_display = limit.display_per_unit * light.row(y)[x];
+        const double noise_std = limit.display_per_unit * std::sqrt(noise.row(y)[x]);
+        const float own = std::log(std::max(gain_within_noise_limit(on_display, noise_std, limit.lightness), 1e-9f));
+        float& value = log_gain.row(y)[x];
+        const float d = own - value;
+        value = is_coarsest ? own : value + d * std::clamp((std::fabs(d) - 0.2f) / 0.2f, 0.0f, 1.0f);
+      }
+    });
+  }
+  const PlaneView<float> log_gain = gain[finest];
+  for_each_row(executor, log_gain.height, [&](int y) {
+    for (int x = 0; x < log_gain.width; ++x) log_gain.row(y)[x] = std::exp(log_gain.row(y)[x]);
   });
-  between.interpolate(level, 0, executor);
-  for_each_row(executor, e.height, [&](int y) {
+  gain.interpolate(finest, 0, executor);
+  const PlaneView<float> factor = gain[0];
+  for_each_row(executor, factor.height, [&](int y) {
     for (float* const part_row : {base.row(y), detail.row(y), chroma[0].row(y)}) {
-      for (int x = 0; x < e.width; ++x) part_row[x] *= e.row(y)[x];
+      for (int x = 0; x < factor.width; ++x) part_row[x] *= factor.row(y)[x];
     }
   });
 }
