@@ -30,6 +30,7 @@ constexpr PicturePart quick_part{192, 128};
 constexpr PicturePart shown_part{288, 192};  // size of a crop in the report: enlarged twice, it fills its column
 constexpr std::size_t pictures_used = 3;
 constexpr int rounds_by_one = 3;
+constexpr int timed_side = 3;  // images along each side of the frame that is timed
 constexpr std::size_t min_undominated = 6;
 constexpr double min_span = 50;
 constexpr std::string_view light_of_images = "20 e-";
@@ -103,6 +104,26 @@ Result<std::vector<SimulatedRaws>> raws_of(const std::vector<BenchPicture>& pict
   return out;
 }
 
+/// Returns an image that repeats another `side` times in each direction, mirrored in between.
+BenchPicture repeated(const BenchPicture& picture, int side) {
+  const int width = picture.linear.width(), height = picture.linear.height();
+  BenchPicture out{picture.name, SceneLinear(side * width, side * height)};
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (int y = 0; y < side * height; ++y) {
+      const float* const from = picture.linear.plane[c].row(y / height % 2 == 0 ? y % height : height - 1 - y % height);
+      float* const to = out.linear.plane[c].row(y);
+      for (int k = 0; k < side; ++k) {
+        if (k % 2 == 0) {
+          std::copy_n(from, width, to + k * width);
+        } else {
+          std::reverse_copy(from, from + width, to + k * width);
+        }
+      }
+    }
+  }
+  return out;
+}
+
 /// An image captured in one light, and its true colours developed.
 struct Scene {
   const RawFrame& noisy;
@@ -149,8 +170,9 @@ struct MeasuredPlans {
   std::vector<AccuracyRow> by_one;
 };
 
-Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, bool with_noise, const DevelopLight& light, Look look,
-                               const AccuracyTiming& timing, Executor& executor) {
+/// @param timed  a frame as those of the scenes
+Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, const RawFrame& timed, bool with_noise,
+                               const DevelopLight& light, Look look, const AccuracyTiming& timing, Executor& executor) {
   AccuracyGroup group{
       fmt::format("{}, {}{}", light.name, look == Look::eye ? "eye" : "camera", with_noise ? "" : ", no noise"),
       "mean CIEDE2000 against the true scene",
@@ -161,7 +183,6 @@ Result<MeasuredPlans> measured(const std::vector<Scene>& scenes, bool with_noise
     return with_noise ? scene.noisy : scene.mean;
   };
   const auto exposure_of = [with_noise](const Scene& scene) { return with_noise ? scene.noisy_ev : scene.exposure_ev; };
-  const RawFrame& timed = frame_of(scenes.front());
   const std::span<const PlanChoice> choices =
       with_noise ? std::span<const PlanChoice>(plan_choices) : std::span<const PlanChoice>(noise_free_choices);
   for (const PlanChoice& choice : choices) {
@@ -246,15 +267,19 @@ Result<void> add_pictures(const RawFrame& frame, const DevelopLight& light, Exec
   return {};
 }
 
-Result<void> gather(const std::vector<BenchPicture>& pictures, const DevelopLight& light, const AccuracyTiming& timing,
-                    Executor& executor, Gathered& out) {
+Result<void> gather(const std::vector<BenchPicture>& pictures, int side_of_timed, const DevelopLight& light,
+                    const AccuracyTiming& timing, Executor& executor, Gathered& out) {
   const auto raws = raws_of(pictures, light, executor);
   if (!raws) return tl::make_unexpected(raws.error());
+  // Planning takes much of the time of small frames, and little of those of cameras.
+  const auto timed = simulated_raws(repeated(pictures.front(), side_of_timed), light, 1, executor);
+  if (!timed) return tl::make_unexpected(timed.error());
   for (const Look look : {Look::camera, Look::eye}) {
     const auto scenes = scenes_of(*raws, light, look, executor);
     if (!scenes) return tl::make_unexpected(scenes.error());
     for (const bool with_noise : {true, false}) {
-      const auto plans = measured(*scenes, with_noise, light, look, timing, executor);
+      const auto plans =
+          measured(*scenes, with_noise ? timed->noisy : timed->mean, with_noise, light, look, timing, executor);
       if (!plans) return tl::make_unexpected(plans.error());
       if (with_noise) out.findings.push_back(undominated_finding(plans->by_all));
       out.rows.insert(out.rows.end(), plans->by_all.begin(), plans->by_all.end());
@@ -280,7 +305,7 @@ Result<BenchOutcome> run_develop_bench(const BenchOptions& options) {
   const std::vector<DevelopLight> lights = develop_lights(quick);
   Gathered all_lights;
   for (const DevelopLight& light : lights) {
-    const auto done = gather(*pictures, light, timing, executor, all_lights);
+    const auto done = gather(*pictures, quick ? 1 : timed_side, light, timing, executor, all_lights);
     if (!done) return tl::make_unexpected(done.error());
     options.advance(1 / static_cast<double>(lights.size()), "plans at " + light.name);
   }
@@ -297,8 +322,8 @@ Result<BenchOutcome> run_develop_bench(const BenchOptions& options) {
       "{} images{} from a simulated camera of 14 bits with masked columns. The reference is developed from the true "
       "colours of every pixel with the same brightness and look. `no noise` is the mean of the signal, whose error is "
       "that of demosaicing. Half sizes are enlarged for the comparison. Megapixels are those of the mosaic. Times are "
-      "those of the first image with planning, by one thread in {} rounds",
-      pictures->size(), quick ? ", quick: crops of them," : "", rounds_by_one));
+      "those of a frame of {} times the first image with planning, by one thread in {} rounds",
+      pictures->size(), quick ? ", quick: crops of them," : "", quick ? 1 : timed_side * timed_side, rounds_by_one));
   return out;
 }
 
