@@ -59,6 +59,8 @@ struct Shrink {
     }
     in.chroma = planes_of(frame, l) == 4 ? chroma : nullptr;
     in.luma_shaped = luma_shaped_power(l, frame.levels);
+    in.pilot_power[0] = pilot_power_of_luma;
+    in.pilot_power[1] = pilot_power_of_chroma(l);
     in.coarsest = l + 1 == frame.levels;
     return in;
   }

@@ -30,8 +30,8 @@ constexpr ResidualShares residual_fractions(PlaneKind kind, int pass, int rows_a
     float coarser;
   };
   const int recipe = pass == 0 ? 0 : rows_apart == 4 ? 1 : 2;
-  constexpr Other other[2][3] = {{{25.8e-6f, 0}, {19.9e-6f, 2.8e-6f}, {11.9e-6f, 2.1e-6f}},
-                                 {{8.3e-6f, 2.3e-6f}, {8.8e-6f, 2.6e-6f}, {7.3e-6f, 1.9e-6f}}};
+  constexpr Other other[2][3] = {{{25.8e-6f, 0}, {16.6e-6f, 2.7e-6f}, {10.2e-6f, 2.0e-6f}},
+                                 {{8.3e-6f, 2.3e-6f}, {8.7e-6f, 2.5e-6f}, {7.2e-6f, 1.9e-6f}}};
   const Other& o = other[kind == PlaneKind::luma ? 0 : 1][recipe];
   const float mean = (recipe == 2 ? 0.473f : 0.548f) / 64;
   return {level == 0 ? 1.0f / 64 : 0.25f / 64, level == 0 ? o.finest : o.coarser, level + 1 == levels ? mean : 0};

@@ -109,6 +109,7 @@ struct BlockRow {
   const std::uint8_t* chroma;  // for each strip, whether C1, C2, C3 are wanted; null: nowhere
   /// Power of a spectrum shaped like that of luma over that of the chroma that is known: at least as much is expected.
   float luma_shaped;
+  float pilot_power[2];  // factor of the pilot's squared coefficients; luma, chroma
   /// Blocks of the coarsest level have the weight 1 / V, others 1 / (V sum g^2): there, colours fainter than their
   /// noise are in few blocks, which would count less than those around them.
   bool coarsest;

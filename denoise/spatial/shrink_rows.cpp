@@ -67,7 +67,8 @@ HWY_INLINE void shrink_strip(const BlockRow& in, int plane, int first, int count
     const VF variance = load(m.variance + first + i);
     VF power;
     if (in.pilot[0] != nullptr) {
-      power = plane == 0 ? wiener_luma(s, i, variance) : wiener_chroma(s, i, variance, in.luma_shaped);
+      power = plane == 0 ? wiener_luma(s, i, variance, in.pilot_power[0])
+                         : wiener_chroma(s, i, variance, in.luma_shaped, in.pilot_power[1]);
     } else {
       power = plane == 0 ? threshold_luma(s, i, variance) : threshold_chroma(s, i, variance, in.luma_shaped);
     }

@@ -233,26 +233,30 @@ HWY_INLINE VF pilot_squares(const Strip& s, int place, float* square, std::ptrdi
   return sum;
 }
 
-/// Empirical Wiener gains of luma: P is the pilot's.
-HWY_INLINE VF wiener_luma(Strip& s, int place, VF variance) {
+/// Empirical Wiener gains of luma: P is `pilot_power` times the pilot's.
+HWY_INLINE VF wiener_luma(Strip& s, int place, VF variance, float pilot_power) {
   const VF sum = pilot_squares(s, place, s.luma[0] + place, run);
   store(hn::MulAdd(constant(4), variance, sum), s.luma_power + place);
   const auto row = [&](int v, VF(&x)[8]) HWY_ATTR { coefficients(s.noisy[v], place, x); };
-  return filter(s, place, row, [&](int i, VF) HWY_ATTR { return wiener_gain(load(s.luma[i] + place), variance); });
+  const VF noise = hn::Mul(constant(1 / pilot_power), variance);
+  return filter(s, place, row, [&](int i, VF) HWY_ATTR { return wiener_gain(load(s.luma[i] + place), noise); });
 }
 
-/// Empirical Wiener gains of chroma, after those of luma: P is the larger of the pilot's and of a spectrum shaped like
-/// that of the luma. The pilot has lost the fine structure of colour, which mostly lies where luma has its own.
+/// Empirical Wiener gains of chroma, after those of luma: P is the larger of `pilot_power` times the pilot's and of a
+/// spectrum shaped like that of the luma. The pilot has lost the fine structure of colour, which mostly lies where luma
+/// has its own.
 /// @param luma_shaped  power of that spectrum over the pilot's
-HWY_INLINE VF wiener_chroma(Strip& s, int place, VF variance, float luma_shaped) {
+HWY_INLINE VF wiener_chroma(Strip& s, int place, VF variance, float luma_shaped, float pilot_power) {
   HWY_ALIGN float square[64 * hn::MaxLanes(Floats())];
   const int n = lanes();
   const VF sum = pilot_squares(s, place, square, n);
-  const VF per_luma = hn::Div(hn::Mul(constant(luma_shaped), sum), load(s.luma_power + place));
+  // Powers and noise in units of pilot_power.
+  const VF per_luma = hn::Div(hn::Mul(constant(luma_shaped / pilot_power), sum), load(s.luma_power + place));
+  const VF noise = hn::Mul(constant(1 / pilot_power), variance);
   const auto row = [&](int v, VF(&x)[8]) HWY_ATTR { coefficients(s.noisy[v], place, x); };
   return filter(s, place, row, [&](int i, VF) HWY_ATTR {
     const VF power = hn::Max(hn::Mul(per_luma, load(s.luma[i] + place)), load(square + i * n));
-    return wiener_gain(power, variance);
+    return wiener_gain(power, noise);
   });
 }
 

@@ -197,16 +197,17 @@ double faint_power(int p, const std::array<Block, 4>& f, const std::array<double
 
 /// Returns the gains of the coefficients of plane p (sections "pass 1" and "pass 2" of denoise/README.md).
 /// @param known  the noisy coefficients, of which those above thresholds are known, or the pilot's
-/// @param luma_shaped  see denoise::luma_shaped_power
-Block gains(int p, const std::array<Block, 4>& known, const std::array<double, 4>& variance, bool hard,
-            double luma_shaped) {
+Block gains(int p, const std::array<Block, 4>& known, const std::array<double, 4>& variance, bool hard, int level,
+            int levels) {
   const Block own = power_of(p, known, variance, hard), luma = power_of(0, known, variance, hard);
-  const double per_luma = p == 0 ? 0 : luma_shaped * sum_of(own) / (sum_of(luma) + 4 * variance[0]);
+  const double per_luma =
+      p == 0 ? 0 : denoise::luma_shaped_power(level, levels) * sum_of(own) / (sum_of(luma) + 4 * variance[0]);
   const double faint = hard ? faint_power(p, known, variance) : 0;
+  const double pilot = p == 0 ? denoise::pilot_power_of_luma : denoise::pilot_power_of_chroma(level);
   Block gain{};
   for (int v = 0; v < block; ++v) {
     for (int u = 0; u < block; ++u) {
-      const double rest = !hard ? own[v][u] : u + v == 0 ? 0 : faint / std::hypot(u, v);
+      const double rest = !hard ? pilot * own[v][u] : u + v == 0 ? 0 : faint / std::hypot(u, v);
       const double power = std::max(rest, per_luma * luma[v][u]);
       gain[v][u] = hard && is_kept(p, u, v, known, variance) ? 1 : power / (power + variance[p]);
     }
@@ -238,8 +239,7 @@ Shrunk shrink(const Four& x, const Four& variance, const Four* pilot, int rows_a
         for (int i = 0; i < block * block; ++i) v[p] += variance[p].at(x0 + i % block, y0 + i / block) / 64;
       }
       for (int p = 0; p < 4; ++p) {
-        const Block gain =
-            gains(p, pilot == nullptr ? f : of_pilot, v, pilot == nullptr, denoise::luma_shaped_power(level, levels));
+        const Block gain = gains(p, pilot == nullptr ? f : of_pilot, v, pilot == nullptr, level, levels);
         Block kept{};
         double power = 0;
         for (int i = 0; i < block * block; ++i) {
