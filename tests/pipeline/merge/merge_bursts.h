@@ -50,6 +50,29 @@ inline double textured(double x, double y, int colour, double level) {
   return level * std::max(0.1, 1 + 0.14 * sum);
 }
 
+/// Returns the positions of hand-held frames: each is displaced by up to `reach_px` along each axis and turned by up to
+/// one degree, drawn from the seed and its index.
+inline std::function<std::array<double, 2>(int, double, double)> hand_held_position(int width, int height,
+                                                                                    double reach_px,
+                                                                                    std::uint64_t seed) {
+  constexpr std::uint64_t max_frames = 64;
+  struct Motion {
+    double dx, dy, cosine, sine;
+  };
+  std::vector<Motion> motions;
+  for (std::uint64_t i = 0; i < max_frames; ++i) {
+    std::mt19937_64 draw(seed + i);
+    std::uniform_real_distribution<double> unit(-1, 1);
+    const double dx = reach_px * unit(draw), dy = reach_px * unit(draw), turn = std::numbers::pi / 180 * unit(draw);
+    motions.push_back({dx, dy, std::cos(turn), std::sin(turn)});
+  }
+  return [=](int index, double x, double y) {
+    const Motion& m = motions.at(static_cast<std::size_t>(index));
+    const double u = x - width / 2.0 - m.dx, v = y - height / 2.0 - m.dy;
+    return std::array{width / 2.0 + u * m.cosine + v * m.sine, height / 2.0 - u * m.sine + v * m.cosine};
+  };
+}
+
 /// Frames of the smooth scene, each with its own noise: 512 DN black, 4 DN/e-, 14 bits.
 struct Burst {
   int width = 256;

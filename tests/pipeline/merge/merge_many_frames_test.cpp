@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
-#include <numbers>
 #include <random>
 #include <string>
 #include <utility>
@@ -30,14 +29,7 @@ constexpr Rect middle{24, 24, width - 48, height - 48};
 Burst hand_held(double mean_e, std::uint64_t draws) {
   Burst burst{.width = width, .height = height, .mean_e = mean_e};
   burst.scene = [mean_e](double x, double y, int colour) { return test::textured(x, y, colour, mean_e); };
-  burst.position = [draws](int index, double x, double y) {
-    std::mt19937_64 draw(1000 * draws + static_cast<std::uint64_t>(index));
-    std::uniform_real_distribution<double> unit(-1, 1);
-    const double dx = 12 * unit(draw), dy = 12 * unit(draw), turn = std::numbers::pi / 180 * unit(draw);
-    const double u = x - width / 2.0 - dx, v = y - height / 2.0 - dy;
-    return std::array{width / 2.0 + u * std::cos(turn) + v * std::sin(turn),
-                      height / 2.0 - u * std::sin(turn) + v * std::cos(turn)};
-  };
+  burst.position = test::hand_held_position(width, height, 12, 1000 * draws);
   return burst;
 }
 

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <memory>
 #include <numbers>
-#include <random>
 #include <utility>
 
 #include "tests/pipeline/merge/merge_bursts.h"
@@ -19,13 +18,7 @@ using test::Burst;
 Burst hand_held(double mean_e) {
   Burst burst{.width = 320, .height = 256, .mean_e = mean_e};
   burst.scene = [mean_e](double x, double y, int colour) { return test::textured(x, y, colour, mean_e); };
-  burst.position = [](int index, double x, double y) {
-    std::mt19937_64 draw(static_cast<std::uint64_t>(index));
-    std::uniform_real_distribution<double> unit(-1, 1);
-    const double dx = 20 * unit(draw), dy = 20 * unit(draw), turn = std::numbers::pi / 180 * unit(draw);
-    const double u = x - 160 - dx, v = y - 128 - dy;
-    return std::array{160 + u * std::cos(turn) + v * std::sin(turn), 128 - u * std::sin(turn) + v * std::cos(turn)};
-  };
+  burst.position = test::hand_held_position(burst.width, burst.height, 20, 0);
   return burst;
 }
 
