@@ -1,11 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "capture/file/dng_source.h"
@@ -239,6 +241,20 @@ TEST_F(MergeCommand, MergesABracketByItsExposureTimes) {
   EXPECT_EQ(report["bracket"], true);
   EXPECT_EQ(report["frames"][1]["reference"], true);  // the longest
   EXPECT_NEAR(report["frames"][0]["light"], 0.25, 0.0125);
+  EXPECT_TRUE(report["mean_count"].is_null());  // weights differ by place
+}
+
+TEST_F(MergeCommand, NoDisplacementIsStatedWhereNoneCouldBeFound) {
+  simulated("flat", "flat.dng", {"--luminance", "0.01", "--size", "192x128", "--frames", "2", "--no-truth"});
+  const std::vector<std::string> flats{file("flat_0000.dng"), file("flat_0001.dng")};
+  const auto result = merge(flats, {"--align", "subpixel", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json frame = Json::parse(result.out)["frames"][1];
+  EXPECT_EQ(frame["aligned"], false);
+  EXPECT_TRUE(frame["largest_shift_px"].is_null() && frame["shift_error_px"].is_null()) << frame;
+  const auto text = merge(flats, {"--align", "subpixel", "--explain", "--force"});
+  EXPECT_NE(text.out.find("its displacement could not be found"), std::string::npos) << text.out;
+  EXPECT_EQ(text.out.find("moved by"), std::string::npos) << text.out;
 }
 
 TEST_F(MergeCommand, DrizzlesANightThatOtherCommandsDevelop) {
@@ -345,6 +361,32 @@ TEST_F(MergeCommand, RefusesWhatCannotBeMerged) {
   EXPECT_EQ(again.exit_code, 1);
   EXPECT_NE(again.err.find("exists"), std::string::npos);
   EXPECT_EQ(merge(frames_, {"--force"}).exit_code, 0);
+}
+
+TEST_F(MergeCommand, AnExistingOutputIsKeptAndTheMessageNamesOptionsOfMergeOnly) {
+  ASSERT_EQ(merge(frames_).exit_code, 0);
+  const auto again = merge(frames_);
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_NE(again.err.find("exists: use --force to overwrite it"), std::string::npos) << again.err;
+  EXPECT_EQ(again.err.find("--skip-existing"), std::string::npos) << again.err;
+  EXPECT_EQ(merge(frames_, {"--force"}).exit_code, 0);
+  std::filesystem::remove(file("merged.dng"));
+  std::filesystem::create_directory(file("merged.dng"));
+  const auto folder = merge(frames_, {"--force"});
+  EXPECT_EQ(folder.exit_code, 1);
+  EXPECT_NE(folder.err.find("it is a directory"), std::string::npos) << folder.err;
+}
+
+TEST_F(MergeCommand, TheTimeToCheckNamesDoesNotGrowWithTheSquareOfTheirNumber) {
+  const std::string folder = file("many");
+  std::filesystem::create_directory(folder);
+  for (int i = 0; i < 5000; ++i) {  // links to nothing: only names are checked before the first is read
+    std::filesystem::create_symlink("none", fmt::format("{}/{}.dng", folder, i));
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  refused({folder}, {}, 1, "no such file");
+  // It takes 0.1 s, and 15 s or more if each is compared with each.
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
 }
 
 }  // namespace

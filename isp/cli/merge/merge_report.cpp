@@ -102,7 +102,8 @@ std::string merge_text(const MergeReport& report) {
       continue;
     }
     std::string text = fmt::format("{}: {:.1f} %: {}", inputs[i], 100 * use.used_fraction, reason_of(use, by_stars));
-    if (moved) text += fmt::format("; moved by up to {:.2f} px (+- {:.2f})", use.largest_shift_px, use.shift_error_px);
+    if (moved && use.aligned)
+      text += fmt::format("; moved by up to {:.2f} px (+- {:.2f})", use.largest_shift_px, use.shift_error_px);
     if (by_stars && static_cast<int>(i) == merged.reference)
       text += "; it is the reference";
     else if (by_stars)
@@ -132,8 +133,8 @@ std::string merge_json(const MergeReport& report) {
                       {"light", use.light},
                       {"mean_chi_square", use.mean_chi_square},
                       {"aligned", use.aligned},
-                      {"largest_shift_px", use.largest_shift_px},
-                      {"shift_error_px", use.shift_error_px},
+                      {"largest_shift_px", use.aligned ? Json(use.largest_shift_px) : Json()},
+                      {"shift_error_px", use.aligned ? Json(use.shift_error_px) : Json()},
                       {"reason", reason_of(use, by_stars)}});
   }
   Json times = Json::array();
@@ -142,7 +143,7 @@ std::string merge_json(const MergeReport& report) {
   Json json{{"alignment", alignment_name(merged.alignment)},
             {"bracket", merged.bracket},
             {"saturation", Json::parse(saturation_json(merged.saturation))},
-            {"mean_count", merged.mean_count},
+            {"mean_count", merged.bracket ? Json() : Json(merged.mean_count)},
             {"stars", merged.stars},
             {"still_fraction", merged.still_fraction},
             {"empty_fraction", merged.empty_fraction},

@@ -77,6 +77,9 @@ int run_merge(const std::vector<std::string>& words) {
   const auto& args = std::get<DevelopArgs>(parsed);
   const Result<Files> files = input_files(args);
   if (!files) return print_argument_error("merge", files.error(), args.defaults, object_if(args.json));
+  if (const auto free = check_output_path(args.output, args.force); !free) {
+    return print_failure(free.error(), object_if(args.json));
+  }
   Result<RawBatch> batch = make_batch(args, args.options, {files->output}, files->calibration);
   if (!batch) return print_failure(batch.error(), object_if(args.json));
   const Result<MergeReport> report = merge_and_write(args, *files, *batch);

@@ -154,7 +154,9 @@ Result<std::vector<Job>> plan_outputs(const DevelopArgs& args, const std::string
 }
 
 Result<void> check_unharmed(const std::vector<Job>& jobs, const std::vector<std::string>& read) {
+  std::set<std::string> checked;  // all frames of a merge have one output
   for (const Job& job : jobs) {
+    if (!checked.insert(job.output).second) continue;
     for (const std::string& file : read) {
       if (!file.empty() && (job.output == file || same_file(job.output, file))) {
         return fail(ErrorCode::invalid_argument, fmt::format("{} would replace a file that is read", job.output), "-o");
