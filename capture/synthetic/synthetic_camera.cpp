@@ -16,6 +16,15 @@
 namespace lowlux::capture {
 namespace {
 
+/// Returns the camera RGB of a white, its largest channel 1; all 0 without light.
+Vector3 neutral_of(const SpectralResponse& response, const Spectrum& white) {
+  Vector3 out = isp::electron_rate(response, white);
+  const double largest = *std::max_element(out.begin(), out.end());
+  if (!(largest > 0)) return {};
+  for (double& channel : out) channel /= largest;
+  return out;
+}
+
 /// Returns matrices for A and D65 fitted to the camera's sensitivities, and the neutral of the scene's white.
 Result<CameraColour> colour_of(const isp::NamedSensor& sensor, const SpectralResponse& response,
                                const Spectrum& white) {
@@ -26,14 +35,13 @@ Result<CameraColour> colour_of(const isp::NamedSensor& sensor, const SpectralRes
     if (!calibration) return tl::make_unexpected(calibration.error());
     colour.calibrations.push_back(*calibration);
   }
-  Vector3 neutral = isp::electron_rate(response, white);
-  const double largest = *std::max_element(neutral.begin(), neutral.end());
-  if (!(*std::min_element(neutral.begin(), neutral.end()) > 1e-6 * largest)) {
-    // A light that leaves a channel dark (or no light) gives no white balance: daylight replaces it.
-    neutral = isp::electron_rate(response, *isp::radiance_of(*isp::light_named("D65"), 1));
+  colour.as_shot_neutral = neutral_of(response, white);
+  if (!(*std::ranges::min_element(*colour.as_shot_neutral) > 1e-6) ||
+      !isp::white_of_neutral(colour, *colour.as_shot_neutral)) {
+    // A light that leaves a channel dark (or no light), or whose camera RGB the matrices map to no colour of a light,
+    // as narrow bands of blue, gives no white balance: daylight replaces it.
+    colour.as_shot_neutral = neutral_of(response, *isp::radiance_of(*isp::light_named("D65"), 1));
   }
-  const double scale = *std::max_element(neutral.begin(), neutral.end());
-  colour.as_shot_neutral = Vector3{neutral[0] / scale, neutral[1] / scale, neutral[2] / scale};
   colour.source = CameraColour::Source::file_tags;
   return colour;
 }

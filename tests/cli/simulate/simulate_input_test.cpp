@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <limits>
 
+#include <fmt/format.h>
+
 #include "isp/codec/exr.h"
 #include "isp/codec/pfm.h"
 #include "tests/cli/simulate/simulate_command.h"
@@ -240,6 +242,19 @@ TEST_F(SimulateInput, LightsThatCannotBeAreRefused) {
   for (const std::string& light : {dark, invisible, endless}) {
     expect_refused("chart", {"--light", light}, 2, "finite number");
     expect_refused("flat", {"--lamp", "3,3," + light + ",1"}, 2, "no luminance");
+  }
+}
+
+TEST_F(SimulateInput, LightOfAnyNarrowBandGivesRawFilesThatCanBeDeveloped) {
+  for (int peak_nm = 400; peak_nm <= 700; peak_nm += 20) {
+    std::string rows = "wavelength_nm,power\n";
+    for (int nm = 380; nm <= 780; nm += 5) {
+      rows += fmt::format("{},{:.6g}\n", nm, std::exp(-std::pow((nm - peak_nm) / 8.0, 2)));
+    }
+    const std::string raw = fmt::format("band{}.dng", peak_nm);
+    simulated("chart", raw, {"--light", table("band", rows), "--luminance", "1", "--no-truth", "--quiet"});
+    const auto developed = lowlux({"develop", file(raw), "-o", file("band.png"), "--force", "--quiet"});
+    EXPECT_EQ(developed.exit_code, 0) << peak_nm << developed.err;
   }
 }
 
