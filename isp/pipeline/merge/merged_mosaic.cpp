@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -139,11 +140,11 @@ void mark_saturated(Plane<float>& mean, const Plane<float>& weight, PlaneView<co
   });
 }
 
-/// Returns how the variance differs from what the NoiseProfile states, by blocks; null where it hardly does.
+/// Returns how the variance differs from what the NoiseProfile states, by blocks.
 /// @param stated_variance  stated variance of a site (x, y), in the unit of 1 / weight
 template <class Found, class Stated>
-std::shared_ptr<const NoiseRatio> noise_ratio(const Plane<float>& weight, const Found& found_variance,
-                                              const Stated& stated_variance, Executor& executor) {
+NoiseRatio noise_ratio(const Plane<float>& weight, const Found& found_variance, const Stated& stated_variance,
+                       Executor& executor) {
   NoiseRatio out{.block_px = merge::block_px};
   out.ratio = Plane<float>((weight.width() + out.block_px - 1) / out.block_px,
                            (weight.height() + out.block_px - 1) / out.block_px);
@@ -157,13 +158,25 @@ std::shared_ptr<const NoiseRatio> noise_ratio(const Plane<float>& weight, const 
           stated += stated_variance(x, y);
         }
       }
-      const double ratio = found > 0 && stated > 0 ? found / stated : 1;
-      out.ratio.at(column, row) = static_cast<float>(std::clamp(ratio, min_ratio, max_ratio));
+      out.ratio.at(column, row) = found > 0 && stated > 0 ? static_cast<float>(found / stated) : 1;
     }
   });
-  const auto [least, most] = std::minmax_element(out.ratio.data(), out.ratio.data() + out.ratio.size());
-  if (*least > 1 - hardly_different && *most < 1 + hardly_different) return nullptr;
-  return std::make_shared<const NoiseRatio>(std::move(out));
+  return out;
+}
+
+/// Sets the noise ratio of the frame, unless it is hardly different from 1. If it exceeds what a DNG can state, as
+/// where only the shortest exposure of a bracket of many EV is not saturated, the NoiseProfile is raised by the excess.
+void state_noise_ratio(NoiseRatio ratio, RawFrame& frame) {
+  const std::span<float> values(ratio.ratio.data(), ratio.ratio.size());
+  const auto [least, most] = std::ranges::minmax(values);
+  if (least > 1 - hardly_different && most < 1 + hardly_different) return;
+  const double excess = std::max(static_cast<double>(most) / max_ratio, 1.0);
+  for (double& scale : frame.noise->scale) scale *= excess;
+  for (double& offset : frame.noise->offset) offset *= excess;
+  for (float& value : values) {
+    value = static_cast<float>(std::clamp(static_cast<double>(value) / excess, min_ratio, max_ratio));
+  }
+  frame.noise_ratio = std::make_shared<const NoiseRatio>(std::move(ratio));
 }
 
 /// Replaces each value of a line by the mean of those around it that have its parity.
@@ -209,7 +222,7 @@ void encode_merged(merge::MosaicMean& mean, const FrameElectrons& reference, Pla
     out.frame.noise = residual_profile(merged, site_variance(weight, reference.phase, executor), site_white_e,
                                        levels.rounding_variance(), ProfileFit::least);
     out.frame.noise->reduced = false;
-    out.frame.noise_ratio = noise_ratio(
+    NoiseRatio ratio = noise_ratio(
         weight, [&](int x, int y) { return variance_at(weight, x, y, 0); },
         [&](int x, int y) {
           const auto colour = static_cast<std::size_t>(colour_at(reference.phase, x, y));
@@ -218,6 +231,7 @@ void encode_merged(merge::MosaicMean& mean, const FrameElectrons& reference, Pla
           return (out.frame.noise->scale[colour] * signal + out.frame.noise->offset[colour]) * white * white;
         },
         executor);
+    state_noise_ratio(std::move(ratio), out.frame);
   } else {
     const MeanVariance variance = mean_variance(weight, reference.phase, executor);
     out.mean_count = 1 / variance.of_all;
@@ -225,10 +239,11 @@ void encode_merged(merge::MosaicMean& mean, const FrameElectrons& reference, Pla
     for (std::size_t c = 0; c < 3; ++c) stated[c] *= out.drop_noise[c];
     out.frame.noise = profile_of_mean(reference, stated, out.alignment);
     for (double& offset : out.frame.noise->offset) offset += levels.rounding_variance();
-    out.frame.noise_ratio = noise_ratio(
+    NoiseRatio ratio = noise_ratio(
         weight, [&](int x, int y) { return variance_of_mean_at(weight, x, y); },
         [&](int x, int y) { return variance.of_colour[static_cast<std::size_t>(colour_at(reference.phase, x, y))]; },
         executor);
+    state_noise_ratio(std::move(ratio), out.frame);
   }
   out.frame.noise->source = frame.noise->source;
   const PlaneView<const float> signal_e = std::as_const(merged.value).view();

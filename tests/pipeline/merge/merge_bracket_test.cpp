@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
+#include "isp/base/noise_ratio.h"
 #include "tests/pipeline/merge/merge_bursts.h"
 
 namespace lowlux::isp {
@@ -241,6 +245,37 @@ TEST(MergeBracket, BlocksThatDoNotMatchHaveTheNoiseOfTheLongestExposure) {
     EXPECT_EQ(burst.merged(3, {.alignment = alignment}).reference, 2);
   }
   EXPECT_EQ(burst.merged(3, {.alignment = MergeAlignment::none, .reference = 0}).reference, 0);
+}
+
+// Where only the short exposure is not saturated, the noise is that of another order of magnitude.
+TEST(MergeBracket, ExposuresOfManyStopsStateTheNoiseOfTheirHighlights) {
+  std::mt19937_64 random(5127);
+  for (int draw = 0; draw < 6; ++draw) {
+    const double stops = std::uniform_real_distribution<>(9, 12)(random);
+    const double bright_e = std::uniform_real_distribution<>(50, 2000)(random);
+    const double dark_e = std::uniform_real_distribution<>(50, 300)(random) / std::exp2(stops);
+    SCOPED_TRACE(fmt::format("{:.2f} EV, {:.0f} e- and {:.3g} e-", stops, bright_e, dark_e));
+    Burst burst{.width = 256, .height = 256};
+    burst.light = [stops](int index) { return index == 0 ? 1 : std::exp2(stops); };
+    burst.scene = [&](double x, double, int) { return x < 96 ? bright_e : dark_e * std::exp2((x - 96) / 50); };
+    const MergedRaw merged = burst.merged(2, {.alignment = MergeAlignment::none});
+    ASSERT_TRUE(merged.bracket);
+    const double white_e = test::night_full_e();
+    const NoiseProfile& profile = *merged.frame.noise;
+    const NoiseRatioView ratio = view_of(merged.frame.noise_ratio.get());
+    for (const Rect& area : {Rect{0, 0, 88, 256}, Rect{104, 0, 152, 256}}) {
+      double stated_e2 = 0;
+      for (int y = 0; y < area.height; ++y) {
+        for (int x = area.x; x < area.x + area.width; ++x) {
+          const auto c = static_cast<std::size_t>(colour_at(BayerPhase::grbg, x, y));
+          const double signal = burst.truth_e(x, y) / white_e;
+          stated_e2 += ratio.at(x, y) * (profile.scale[c] * signal + profile.offset[c]) * white_e * white_e;
+        }
+      }
+      stated_e2 /= static_cast<double>(area.width) * area.height;
+      EXPECT_NEAR(stated_e2 / burst.mean_square_error(merged.frame, area, white_e), 1, 0.1) << "column " << area.x;
+    }
+  }
 }
 
 TEST(MergeBracket, WithoutAnExposureTimeItIsRefused) {
