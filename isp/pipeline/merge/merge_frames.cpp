@@ -2,7 +2,12 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cstddef>
+#include <functional>
 #include <map>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -132,6 +137,50 @@ void warn_of_unknown_displacements(MergedRaw& out) {
                   unknown, out.frames.size()));
 }
 
+/// Finds frames with the samples of another one.
+class FrameCopies {
+ public:
+  /// Notes the samples of a frame, which may be read several times.
+  void note(int index, const FrameToMerge& read) {
+    const auto hash = hash_of(read.frame.raw);
+    if (!hash) return;
+    const auto [first, is_new] = first_.try_emplace(*hash, index, read.name);
+    if (is_new || first->second.first == index) return;
+    copies_.try_emplace(index, read.name, first->second.second);
+  }
+
+  void warn(MergedRaw& out) const {
+    if (copies_.empty()) return;
+    const auto& [copy, original] = copies_.begin()->second;
+    out.warnings.push_back(fmt::format(
+        "{} of {} frames have the samples of another frame ({} those of {}): copies do not reduce noise, and the file "
+        "states less noise than it has; leave the copies out",
+        copies_.size(), out.frames.size(), copy, original));
+  }
+
+ private:
+  /// Returns a hash of the samples; nullopt if all rows are equal, as they are in frames that are saturated everywhere.
+  static std::optional<std::size_t> hash_of(const RawDn& raw) {
+    std::size_t hash = 0;
+    bool rows_differ = false;
+    with_samples(raw, [&](const auto& samples) {
+      const auto row_at = [&](int y) {
+        const auto* const first = samples.row(y);
+        return std::string_view(reinterpret_cast<const char*>(first),
+                                static_cast<std::size_t>(samples.width) * sizeof(*first));
+      };
+      for (int y = 0; y < samples.height; ++y) {
+        rows_differ = rows_differ || row_at(y) != row_at(0);
+        hash = 31 * hash + std::hash<std::string_view>()(row_at(y));
+      }
+    });
+    return rows_differ ? std::optional(hash) : std::nullopt;
+  }
+
+  std::map<std::size_t, std::pair<int, std::string>> first_;   // frame and name, by hash
+  std::map<int, std::pair<std::string, std::string>> copies_;  // names of copy and original, by frame
+};
+
 void state_times(MergeContext& work) {
   work.clock.lap("codes");
   add_up(work.out.times);
@@ -147,7 +196,13 @@ Result<MergedRaw> merge_frames(int count, const FrameReader& read, const MergeOp
                                const MergeProgress& progress) {
   if (count < 1) return fail(ErrorCode::invalid_argument, "give at least one frame to merge");
   assert(!options.reference || (*options.reference >= 0 && *options.reference < count));
-  MergeContext work(count, read, options, executor, progress);
+  FrameCopies copies;
+  const FrameReader noting = [&](int index, bool is_reference) {
+    Result<FrameToMerge> frame = read(index, is_reference);
+    if (frame) copies.note(index, *frame);
+    return frame;
+  };
+  MergeContext work(count, noting, options, executor, progress);
   work.out.reference = options.reference.value_or(0);
   work.out.frames.resize(static_cast<std::size_t>(count));
   Result<void> done = merge_once(work);
@@ -158,6 +213,7 @@ Result<MergedRaw> merge_frames(int count, const FrameReader& read, const MergeOp
   if (!done) return tl::make_unexpected(done.error());
   warn_of_frames_left_out(work.out);
   warn_of_unknown_displacements(work.out);
+  copies.warn(work.out);
   state_times(work);
   return std::move(work.out);
 }

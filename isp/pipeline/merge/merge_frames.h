@@ -18,7 +18,8 @@ namespace lowlux::isp {
 /// the reference, and mosaics lie as the sensor reads them out. Errors: no frame (invalid_argument); frames of other
 /// cameras, active areas or mosaics (invalid_argument, with the name), and of a bracket without exposure times
 /// (insufficient); too few stars (insufficient); frames that did not move or differ in exposure where they are to be
-/// drizzled (invalid_argument); those of frame_electrons.
+/// drizzled (invalid_argument); those of frame_electrons. Frames with the samples of another one are averaged, with a
+/// warning.
 Result<MergedRaw> merge_frames(int count, const FrameReader& read, const MergeOptions& options, Executor& executor,
                                const MergeProgress& progress = {});
 

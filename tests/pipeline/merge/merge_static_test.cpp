@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -139,6 +140,31 @@ TEST(MergeStatic, AReaderThatFailsEndsTheMerge) {
   }
   InlineExecutor executor;
   EXPECT_FALSE(merge_frames(0, {}, {}, executor));
+}
+
+TEST(MergeStatic, WarnsOfCopiesOfFrames) {
+  Burst burst;
+  const auto warning_of = [&burst](const std::array<int, 5>& exposed, MergeAlignment alignment) {
+    const FrameReader read = [&](int index, bool) {
+      const auto i = static_cast<std::size_t>(index);
+      return Result<FrameToMerge>({burst.frame(exposed[i]), burst.options(), std::string(1, "abcde"[i])});
+    };
+    InlineExecutor executor;
+    const auto merged = merge_frames(5, read, {.alignment = alignment}, executor);
+    EXPECT_TRUE(merged) << merged.error().message;
+    for (const std::string& warning : merged->warnings) {
+      if (warning.find("samples of another frame") != std::string::npos) return warning;
+    }
+    return std::string();
+  };
+  for (const auto alignment : {MergeAlignment::none, MergeAlignment::cells}) {
+    const std::string warning = warning_of({0, 1, 0, 2, 1}, alignment);  // frames c and e are copies
+    EXPECT_TRUE(warning.starts_with("2 of 5 frames have the samples of another frame (c those of a)")) << warning;
+    EXPECT_EQ(warning_of({0, 1, 2, 3, 4}, alignment), "");
+  }
+  // Frames that are saturated everywhere are equal without being copies.
+  burst.scene = [](double, double, int) { return 1e6; };
+  EXPECT_EQ(warning_of({0, 1, 2, 3, 4}, MergeAlignment::none), "");
 }
 
 }  // namespace
