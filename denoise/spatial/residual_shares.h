@@ -54,11 +54,13 @@ enum class FoundBy : unsigned char { luma, all_planes };
 
 /// Returns the factors on all levels but the coarsest. For luma, `trace` and `squares` hold for texture within a fifth;
 /// for chroma, `squares` does, and `trace` is measured on flat frames. `other` includes three terms for luma: white
-/// noise leaves 12e-6 and 74e-6; false point sources add 1e-5 of V on average, although in one place in ten megapixels;
-/// and G has a seventh more than the sum of its planes, as luma and chroma of one cell covary.
+/// noise; false point sources, which add 1e-5 of V on average, although in one place in ten megapixels; and G has a
+/// seventh more than the sum of its planes, as luma and chroma of one cell covary. `trace` and `other` of luma are
+/// chosen so that the errors of flats and of the patches of charts are predicted (tests/denoise/denoiser_flats_test.cpp
+/// with LOWLUX_NIGHTLY=1).
 constexpr PatchShares patch_fractions(PlaneKind kind, FoundBy found_by) {
   if (kind == PlaneKind::chroma) return {0.08f, 0.6f, 0};
-  return {0.21f, 0.5f, found_by == FoundBy::luma ? 86e-6f : 22e-6f};
+  return {0.15f, 0.5f, found_by == FoundBy::luma ? 74e-6f : 20e-6f};
 }
 
 /// Factor on the noise of a coarser level where chroma starts there: no finer level reduces it. It does not apply to
