@@ -270,6 +270,8 @@ TEST(CleanPixels, UnknownNoiseIsAnError) {
       ASSERT_FALSE(out);
       EXPECT_EQ(out.error().code, ErrorCode::insufficient);
       EXPECT_NE(out.error().message.find("noise is unknown"), std::string::npos);
+      EXPECT_NE(out.error().message.find("--noise"), std::string::npos);
+      EXPECT_EQ(out.error().message.find("--profile"), std::string::npos) << "refused for pixels of all colours";
     }
   }
 }

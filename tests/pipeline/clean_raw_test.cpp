@@ -152,6 +152,7 @@ TEST(CleanRaw, FramesWithoutMosaicOrNoiseModelAreErrors) {
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, ErrorCode::insufficient);
   EXPECT_NE(out.error().message.find("noise is unknown"), std::string::npos);
+  EXPECT_NE(out.error().message.find("--profile"), std::string::npos);
 }
 
 TEST(CleanRaw, IsTheSameForEveryNumberOfThreads) {

@@ -164,9 +164,10 @@ std::optional<Error> noise_obstacle(const RawFrame& frame, const RawLevels& leve
     return Error{ErrorCode::invalid_argument, "the image is too small to separate noise from detail"};
   }
   if (!levels.electrons_at_white) {
-    return Error{ErrorCode::insufficient,
-                 "the noise is unknown: the file has no usable NoiseProfile; give a profile (--profile, see calibrate "
-                 "and calib/profiles)"};
+    return Error{
+        ErrorCode::insufficient,
+        fmt::format("the noise is unknown: the file has no usable NoiseProfile; state it with --noise GAIN,READ{}",
+                    is_mosaic(frame.raw) ? ", or give a profile (--profile, see calibrate and calib/profiles)" : "")};
   }
   return std::nullopt;
 }
