@@ -129,6 +129,8 @@ TEST(HelpFiles, BashOffersVerbsOptionsAndValues) {
   EXPECT_EQ(bash_offers(scratch, "lowlux develop --den"), (Words{"--denoise"}));
   EXPECT_EQ(bash_offers(scratch, "lowlux calibrate black --ma"), (Words{"--map", "--masked"}));
   EXPECT_EQ(bash_offers(scratch, "lowlux develop --denoise d"), (Words{"draft"}));
+  EXPECT_EQ(bash_offers(scratch, "lowlux develop --denoise = d"), (Words{"draft"})) << "as bash divides --denoise=d";
+  EXPECT_EQ(bash_offers(scratch, "lowlux develop --denoise ="), bash_offers(scratch, "lowlux develop --denoise "));
   EXPECT_EQ(bash_offers(scratch, "lowlux develop --profile "), Words{});  // the shell then offers files
   EXPECT_EQ(bash_offers(scratch, "lowlux fry --d"), Words{});
   const Words all = bash_offers(scratch, "lowlux develop --");

@@ -80,6 +80,8 @@ declare -gA _lowlux_options=() _lowlux_values=()
 constexpr std::string_view bash_end = R"(
 _lowlux() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} verb=${COMP_WORDS[1]} name words=
+  # --option=VALUE is three words
+  if [ "$current" = = ]; then current=; elif [ "$previous" = = ]; then previous=${COMP_WORDS[COMP_CWORD - 2]}; fi
   if [ "$COMP_CWORD" -eq 1 ]; then
     for name in "${!_lowlux_options[@]}"; do words+=" ${name%% *}"; done
     words+=' help --help --version'
