@@ -320,7 +320,7 @@ double visible_percentile(std::span<const float> rms_delta_e) {
 
 double residual_noise_fraction(std::optional<denoise::Level> level, double snr) {
   constexpr std::array at{0.2, 0.7, 1.5, 3.0, 6.0, 12.0};
-  constexpr std::array draft{0.12, 0.165, 0.2, 0.245, 0.3, 0.33};
+  constexpr std::array draft{0.14, 0.15, 0.17, 0.19, 0.22, 0.265};
   constexpr std::array standard{0.08, 0.105, 0.12, 0.14, 0.165, 0.19};
   if (!level) return 0.9;
   if (*level >= denoise::Level::high) return 0;
