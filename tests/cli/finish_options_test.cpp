@@ -90,6 +90,7 @@ TEST_F(FinishOptions, AbsurdWhiteBalancesAreOneLine) {
     refused({"--wb", text}, 2, "--wb");
   }
   refused({"--wb", "pick:60000,5"}, 1, "outside the upright image");
+  refused({"--wb", "pick:1000000000,5"}, 1, "outside the upright image");
   refused({"--wb", "100,0.01,100"}, 1, "--wb 5500");
 }
 

@@ -129,6 +129,7 @@ TEST(HelpFiles, BashOffersVerbsOptionsAndValues) {
   EXPECT_EQ(bash_offers(scratch, "lowlux develop --den"), (Words{"--denoise"}));
   EXPECT_EQ(bash_offers(scratch, "lowlux calibrate black --ma"), (Words{"--map", "--masked"}));
   EXPECT_EQ(bash_offers(scratch, "lowlux develop --denoise d"), (Words{"draft"}));
+  EXPECT_EQ(bash_offers(scratch, "lowlux develop --wb f"), (Words{"flash", "fluorescent"}));
   EXPECT_EQ(bash_offers(scratch, "lowlux develop --denoise = d"), (Words{"draft"})) << "as bash divides --denoise=d";
   EXPECT_EQ(bash_offers(scratch, "lowlux develop --denoise ="), bash_offers(scratch, "lowlux develop --denoise "));
   EXPECT_EQ(bash_offers(scratch, "lowlux develop --profile "), Words{});  // the shell then offers files

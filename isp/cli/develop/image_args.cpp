@@ -21,6 +21,7 @@ using Choice = isp::WhiteBalanceChoice;
 
 constexpr double min_gain = 0.01, max_gain = 100;
 constexpr int max_side_px = 65535;
+constexpr int max_place_px = 1'000'000'000;  // places outside of the image are refused where its size is known
 
 Names<Choice> named_choices() {
   Names<Choice> out{{"as-shot", {.mode = Choice::Mode::as_shot}}, {"auto", {.mode = Choice::Mode::automatic}}};
@@ -54,14 +55,14 @@ std::optional<Choice> picked_of(const std::string& text) {
   const auto figures = numbers_of(text.substr(prefix.size()), 3);
   if (!figures || figures->size() < 2) return std::nullopt;
   const auto usable = [](double figure) {
-    return figure >= 0 && figure <= max_side_px && figure == std::floor(figure);
+    return figure >= 0 && figure <= max_place_px && figure == std::floor(figure);
   };
   if (!std::ranges::all_of(*figures, usable)) return std::nullopt;
   Choice out{.mode = Choice::Mode::picked};
   out.picked.x = static_cast<int>((*figures)[0]);
   out.picked.y = static_cast<int>((*figures)[1]);
   if (figures->size() == 3) out.picked.size = static_cast<int>((*figures)[2]);
-  return out.picked.size >= 1 ? std::optional(out) : std::nullopt;
+  return out.picked.size >= 1 && out.picked.size <= max_side_px ? std::optional(out) : std::nullopt;
 }
 
 constexpr double max_saturation = 3;
@@ -107,11 +108,12 @@ std::optional<std::string> set_white_balance(const std::string& text, Choice& ch
 }
 
 void add_white_balance(CLI::App& app, Choice& choice) {
+  std::vector<std::string_view> words{"as-shot", "auto"};
+  for (const isp::WhitePreset preset : isp::all_white_presets) words.push_back(name_of(preset));
   add_text(
-      app, "--wb", "as-shot|auto|PRESET|KELVIN|R,G,B|PIXEL",
-      "white balance: of the camera, estimated, a preset (daylight, cloudy, shade, tungsten, fluorescent, flash), "
-      "colour temperature and tint (5000,10), gains, or pick:X,Y[,SIZE], a place that becomes neutral (default: "
-      "as-shot)",
+      app, "--wb", fmt::format("{}|KELVIN|R,G,B|PIXEL", fmt::join(words, "|")),
+      "white balance: of the camera, estimated, a preset, colour temperature and tint (5000,10), gains, or "
+      "pick:X,Y[,SIZE], a place that becomes neutral (default: as-shot)",
       [&choice](const std::string& text) { return set_white_balance(text, choice); }, Comma::separator);
 }
 
