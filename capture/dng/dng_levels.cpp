@@ -255,9 +255,11 @@ Result<void> read_levels(const TiffDirectory& directory, const DngImage& image, 
     auto black = read_black(directory, **std::move(stated), image, raw, warnings);
     if (!black) return pass_on(black);
     raw.black_tag = *std::move(black);
-  } else if (image.is_float || image.samples > 1) {  // DNG's default, which does not hold for the codes of sensors
+  } else if (image.is_float || image.samples > 1) {
     raw.black_tag = BlackLevel{.samples = image.samples,
                                .pattern_dn = std::vector<double>(static_cast<std::size_t>(image.samples), 0.0)};
+  } else {  // the codes of a sensor seldom have the default: masked pixels, a profile and the user know better
+    raw.is_black_zero_by_default = true;
   }
   return check_levels(raw, "tags WhiteLevel and BlackLevel");
 }

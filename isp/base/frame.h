@@ -89,12 +89,13 @@ struct RawDn {
   SensorLayout layout = SensorLayout::bayer;
   BayerPhase phase = BayerPhase::rggb;  // only for SensorLayout::bayer
   Rect active;
-  Rect default_crop;                    // the region of the active area that makes the image
-  std::vector<Rect> masked;             // light-shielded regions of the readout, in readout pixels
-  bool masked_is_stated = false;        // true: the source states them; false: assumed to be all that is not active
-  std::optional<BlackLevel> black_tag;  // black level that the source states; absent if it states none
-  std::array<double, 3> white_dn{};     // saturation of R, G, B (all equal for monochrome)
-  bool from_x_trans = false;            // linear_rgb that was interpolated from an X-Trans mosaic at reading
+  Rect default_crop;                      // the region of the active area that makes the image
+  std::vector<Rect> masked;               // light-shielded regions of the readout, in readout pixels
+  bool masked_is_stated = false;          // true: the source states them; false: assumed to be all that is not active
+  std::optional<BlackLevel> black_tag;    // black level that the source states; absent if it states none
+  bool is_black_zero_by_default = false;  // the source states none, and its format (DNG) defines 0 as the default
+  std::array<double, 3> white_dn{};       // saturation of R, G, B (all equal for monochrome)
+  bool from_x_trans = false;              // linear_rgb that was interpolated from an X-Trans mosaic at reading
   FrameInfo info;
 
   bool is_float() const { return !dn_float.empty(); }
@@ -121,7 +122,14 @@ struct BlackPoint {
   PerSite<double> dark_mean_e{};   // dark charge left in the data once the pedestal is subtracted; 0 if unknown
   PerSite<double> noise_std_dn{};  // noise of masked pixels; 0 where nothing was measured
   enum class Holds : std::uint8_t { pedestal_only, pedestal_and_dark } holds = Holds::pedestal_only;
-  enum class Source : std::uint8_t { masked_pixels, tag, given, profile, dark_frame } source = Source::tag;
+  enum class Source : std::uint8_t {
+    masked_pixels,
+    tag,
+    given,
+    profile,
+    dark_frame,
+    format_default,  // 0, because nothing states or measures it
+  } source = Source::tag;
   std::optional<BlackLevel> pattern;  // set when `source` is tag and four figures cannot express it
 };
 

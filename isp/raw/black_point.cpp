@@ -108,6 +108,9 @@ Result<BlackPoint> requested_black(const RawDn& raw, const BlackRequest& request
   if (measured.black) return *measured.black;
   if (request.choice == BlackChoice::masked) return fail(ErrorCode::insufficient, measured.refusal);
   if (request.measured) return *request.measured;
+  if (!raw.black_tag && raw.is_black_zero_by_default && request.use_format_default) {
+    return with_dark({.source = BlackPoint::Source::format_default}, request.dark_dn);
+  }
   return tagged_black(raw, request, measured.refusal);
 }
 

@@ -29,8 +29,10 @@ TEST(DngLevels, ABlackLevelThatIsNotStatedIsZeroOfLinearRawAndAbsentOfMosaics) {
     dng.width = dng.height = 64;
     dng.samples = samples;
     dng.remove(50714);
-    const std::optional<BlackLevel> tag = read_built(dng).raw.black_tag;
+    const RawFrame frame = read_built(dng);
+    const std::optional<BlackLevel>& tag = frame.raw.black_tag;
     ASSERT_EQ(tag.has_value(), samples == 3);
+    EXPECT_EQ(frame.raw.is_black_zero_by_default, samples == 1);
     if (tag) {
       EXPECT_EQ(tag->at(1, 2, 2), 0);
     }

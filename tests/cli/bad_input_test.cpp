@@ -133,6 +133,35 @@ TEST_F(BadInput, DamagedTagsThatThePictureCanDoWithoutAreWarningsThatHelp) {
   }
 }
 
+// Without a black level a mosaic gives the picture of a level of 0, and one warning with the cure, which a level that
+// the user gives makes needless.
+TEST_F(BadInput, AMissingBlackLevelIsTheDefaultOfDng) {
+  const auto picture_and_warnings = [&](const DngBuilder& dng, const std::vector<std::string>& options) {
+    const std::vector<std::byte> bytes = dng.build();
+    test::write_file(raw_, bytes.data(), bytes.size());
+    std::vector<std::string> words{test::tested_command(), "develop", raw_, "-o", scratch_.file("out.png"), "--force"};
+    words.insert(words.end(), options.begin(), options.end());
+    const test::ProcessResult result = test::run_process(words);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return std::pair(test::read_file(scratch_.file("out.png")), result.err);
+  };
+  DngBuilder none = small_dng(), zero = small_dng();
+  const auto expected = picture_and_warnings(zero.set(black_level, Tag::numbers(TagType::u16, {0})), {});
+  const auto found = picture_and_warnings(none.remove(black_level), {});
+  EXPECT_EQ(found.first, expected.first);
+  EXPECT_EQ(expected.second.find("black level"), std::string::npos) << expected.second;
+  EXPECT_NE(found.second.find("states no black level, so 0 is used"), std::string::npos) << found.second;
+  EXPECT_NE(found.second.find("--black DN"), std::string::npos) << found.second;
+  const auto given = picture_and_warnings(none, {"--black", "0"});
+  EXPECT_EQ(given.first, expected.first);
+  EXPECT_EQ(given.second.find("black level"), std::string::npos) << given.second;
+  const test::ProcessResult calibrated =
+      test::run_process({test::tested_command(), "calibrate", "noise", raw_, "-o", scratch_.file("p.json")});
+  EXPECT_EQ(calibrated.exit_code, 1);
+  EXPECT_NE(calibrated.err.find("states no black level"), std::string::npos) << calibrated.err;
+  EXPECT_FALSE(scratch_.holds("p.json"));
+}
+
 TEST_F(BadInput, MissingMatricesGiveAnImageWithOneWarning) {
   DngBuilder dng = small_dng();
   dng.remove(colour_matrix_1).remove(50728);
@@ -190,15 +219,6 @@ TEST_F(BadInput, AFailedFileLeavesTheForcedOutputAsItWas) {
       test::run_process({test::tested_command(), "develop", raw_, "-o", scratch_.file("out.png"), "--force"}).exit_code,
       1);
   EXPECT_EQ(test::read_file(scratch_.file("out.png")), "precious");
-}
-
-TEST_F(BadInput, AbsentBlackIsNotGuessed) {
-  DngBuilder dng = small_dng();
-  dng.remove(black_level);
-  expect_refused(develop(dng.build()), "--black");
-  const auto given =
-      test::run_process({test::tested_command(), "develop", raw_, "-o", scratch_.file("out.png"), "--black", "64.5"});
-  EXPECT_EQ(given.exit_code, 0) << given.err;
 }
 
 }  // namespace

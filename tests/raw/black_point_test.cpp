@@ -217,6 +217,27 @@ TEST(BlackPoint, NeitherTagNorMaskedPixelsIsRefusedAndNotGuessed) {
   EXPECT_FALSE(choose_black(raw, {BlackChoice::masked}));  // asked for, so the tag does not stand in
 }
 
+// The default comes last, is no tag, and takes no place of a level that is measured or given.
+TEST(BlackPoint, TheDefaultOfTheFormatIsUsedWhereNothingElseIsKnown) {
+  const BlackPoint of_profile{.pedestal_dn = {500, 501, 502, 503}, .source = BlackPoint::Source::profile};
+  RawDn raw = frame_with_masked_columns(11);
+  raw.black_tag.reset();
+  raw.is_black_zero_by_default = true;
+  EXPECT_EQ(choose_black(raw, {})->source, BlackPoint::Source::masked_pixels);
+  raw.masked.clear();
+  EXPECT_EQ(choose_black(raw, {.measured = of_profile})->pedestal_dn, of_profile.pedestal_dn);
+  EXPECT_FALSE(choose_black(raw, {.choice = BlackChoice::metadata}));
+  EXPECT_FALSE(choose_black(raw, {.use_format_default = false}));
+  const auto black = choose_black(raw, {});
+  ASSERT_TRUE(black);
+  EXPECT_EQ(black->source, BlackPoint::Source::format_default);
+  EXPECT_EQ(black->pedestal_dn, (PerSite<double>{}));
+  EXPECT_EQ(black->holds, BlackPoint::Holds::pedestal_only);
+  const auto with_dark = choose_black(raw, {.dark_dn = {4, 3, 2, 1}});
+  EXPECT_EQ(with_dark->pedestal_dn, (PerSite<double>{4, 3, 2, 1}));
+  EXPECT_EQ(with_dark->holds, BlackPoint::Holds::pedestal_and_dark);
+}
+
 TEST(BlackPoint, FramesOfOneColumnHaveOneColumnOffset) {
   RawDn raw = test::bayer_frame(1, 4, BayerPhase::rggb, [](int, int) { return 600; });
   raw.black_tag = BlackLevel{.pattern_dn = {500}, .column_dn = {3}, .row_dn = {1, 2, 3, 4}};

@@ -36,7 +36,7 @@ Result<calib::ChartPicture> picture_of(const RawFrame& frame, Executor& executor
   if (frame.raw.layout != SensorLayout::bayer) {
     return fail(ErrorCode::unsupported, "a chart is measured on a Bayer mosaic, but the file is not one");
   }
-  const auto black = isp::choose_black(frame.raw, {});
+  const auto black = isp::choose_black(frame.raw, {.use_format_default = false});
   if (!black) return tl::make_unexpected(black.error());
   SignalFraction mosaic = isp::subtract_dark(isp::to_fraction(frame.raw, *black, executor));
   isp::apply_gains(frame.corrections, mosaic.value.view(), executor);

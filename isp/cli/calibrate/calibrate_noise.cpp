@@ -116,7 +116,7 @@ Result<Calibration> calibrate_picture(const CalibrateNoiseArgs& args) {
   const auto at = [&file](const Error& error) { return fail(error.code, error.message, file); };
   const auto setting = calib::setting_of(frame->raw);
   if (!setting) return at(setting.error());
-  const auto black = isp::choose_black(frame->raw, {});
+  const auto black = isp::choose_black(frame->raw, {.use_format_default = false});
   if (!black) return at(black.error());
   PoolExecutor executor(std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8));
   const auto noise =

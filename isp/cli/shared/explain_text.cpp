@@ -272,6 +272,8 @@ std::string_view name_of(BlackPoint::Source source) {
       return "profile";
     case BlackPoint::Source::dark_frame:
       return "dark-frame";
+    case BlackPoint::Source::format_default:
+      return "format-default";
   }
   return "";
 }

@@ -45,7 +45,7 @@ void add_black(Lines& out, const RawFrame& frame) {
     };
     out.add("  tag", fmt::format("{:9.2f} {:9.2f} {:9.2f} {:9.2f}", tag(0), tag(1), tag(2), tag(3)));
   } else {
-    out.add("  tag", "none");
+    out.add("  tag", raw.is_black_zero_by_default ? "none, the default is 0" : "none");
   }
   if (!measured.black) {
     out.add("  measured", fmt::format("not: {}", measured.refusal));
