@@ -71,6 +71,26 @@ double unevenness_of(const Plane<double>& means, const std::vector<double>& comm
   return between_e2 > 0 ? within_e2 / groups_in / between_e2 : INFINITY;
 }
 
+/// Returns the variance of the lines' common offsets. A difference of two lines has twice that variance, and the change
+/// of that difference from one pair of lines to the next six times. The slopes of a smooth, bright scene differ from
+/// line to line by more than offsets do, but change little from one line to the next; the second estimate is used where
+/// they are most of the first.
+/// @param common  differences of lines two apart
+/// @param between  its finite values
+double line_variance_of(const std::vector<double>& common, const std::vector<double>& between) {
+  constexpr double min_of_slopes = 4;  // times the other estimate, which random offsets of 16 lines do not reach
+  std::vector<double> changes;
+  changes.reserve(common.size());
+  for (std::size_t line = 0; line + 2 < common.size(); ++line) {
+    const double change = common[line + 2] - common[line];
+    if (std::isfinite(change)) changes.push_back(change);
+  }
+  const double of_differences = std::pow(robust_std(between), 2) / 2;
+  if (changes.size() < fewest_lines / 2) return of_differences;
+  const double of_changes = std::pow(robust_std(std::move(changes)), 2) / 6;
+  return of_differences > min_of_slopes * of_changes ? of_changes : of_differences;
+}
+
 /// Returns the scatter, or nullopt where too few lines can be compared.
 std::optional<Scatter> scatter_of(const Plane<double>& means) {
   const std::vector<double> common = differences(means, 2);
@@ -88,9 +108,10 @@ std::optional<Scatter> scatter_of(const Plane<double>& means) {
   if (2 * between.size() < static_cast<std::size_t>(means.width())) return std::nullopt;
   const auto used = static_cast<double>(within.size()) / static_cast<double>(between.size());
   if (used < fewest_pixels) return std::nullopt;
-  const double inside = robust_std(within), across = robust_std(between);
+  const double inside = robust_std(within);
   // Each difference holds the noise of two lines, and the groups' own centre has been subtracted.
-  return Scatter{inside * inside / 2 * used / (used - 1), across * across / 2, used, unevenness_of(means, common)};
+  return Scatter{inside * inside / 2 * used / (used - 1), line_variance_of(common, between), used,
+                 unevenness_of(means, common)};
 }
 
 tl::unexpected<Error> too_little(const Plane<double>& means, PlaneView<const float> pixels) {

@@ -164,6 +164,24 @@ TEST(LineNoise, EdgesOfTheSceneDoNotBecomeLines) {
   }
 }
 
+// A sky that becomes brighter towards the horizon has slopes of 4 to 240 e- per row, which are no offsets, and what
+// offsets it has are found.
+TEST(LineNoise, SlopesOfABrightSceneAreNoLines) {
+  const auto sky = [](int x, int y) { return 1000 * std::exp(4.0 * y / 1000) * (1 + 0.5 * ((x + y) % 2)); };
+  for (const double std_e : {0.0, 30.0}) {
+    const std::vector<double> truth = row_offsets(1000, std_e);
+    const auto found = line_offsets_of_frame(frame_of(512, 1000, sky, truth).view(), Lines::rows);
+    ASSERT_TRUE(found) << found.error().message;
+    // The error of a line differs by its brightness, up to a median of sqrt(pi / 2 * 55000 * 1.25 / 512) = 14.5 e-, and
+    // the variance of robust changes has a relative error of 5 * 1.17 * sqrt(3 / 1000).
+    EXPECT_NEAR(std::hypot(found->line_std_e, found->measured_std_e), std::hypot(std_e, found->measured_std_e),
+                0.16 * std::hypot(std_e, found->measured_std_e) + 0.01);
+    if (std_e > 0) {
+      EXPECT_NEAR(found->line_std_e, std_e, 0.2 * std_e);
+    }
+  }
+}
+
 TEST(LineNoise, KnownByCalibrationKeepsBlindsInThePicture) {
   const Scene blinds = [](int, int y) { return y / 2 % 2 == 0 ? 20.0 : 32.0; };
   const std::vector<double> truth = row_offsets(256, 1);
