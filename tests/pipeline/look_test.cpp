@@ -346,8 +346,8 @@ TEST(ModelLook, TheSpectralModelWeighsTheNoiseThatIsLeft) {
   EXPECT_NEAR(bright, 1, 0.02);
 }
 
-// A grey in the dark, by the noise model and after each level of noise reduction, whose remaining noise is predicted
-// with scatter: its noise as it comes out, in L*, is within the limit, and the limit adds none of its own.
+// A grey in the dark, by the noise model alone and after draft and standard, whose remaining noise is predicted with
+// scatter: its noise as it comes out, in L*, is within the limit, and the limit adds none of its own.
 TEST(NoiseLimit, HoldsInThePicture) {
   const auto seed = static_cast<std::uint32_t>(std::random_device{}());
   std::mt19937_64 engine(seed);

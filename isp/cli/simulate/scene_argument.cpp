@@ -108,6 +108,9 @@ Result<SceneOfArgs> extended_scene(const SceneArgs& args, Executor& executor) {
   const bool made =
       args.what == "dark" || args.what == "flat" || args.what == "chart" || args.what.starts_with("chart:");
   if (args.picture || !made) return picture_of(args, executor);
+  if (args.what == "dark" && args.light_given) {
+    return fail(ErrorCode::invalid_argument, "the scene dark has no light; flat and charts have", "--light");
+  }
   const auto setup = setup_of(args);
   if (!setup) return tl::make_unexpected(setup.error());
   auto scene = args.what == "dark"   ? capture::dark_scene(*setup)

@@ -137,6 +137,7 @@ TEST_F(SimulateInput, OptionsThatWouldDoNothingNameTheOneThatIsMissing) {
 TEST_F(SimulateInput, PicturesHaveTheirOwnSizeAndLight) {
   const std::string scene = picture("scene.pfm", pfm_of(grey(0.5F)));
   expect_refused(scene, {"--size", "32x24"}, 2, "own size (--size)");
+  expect_refused("dark", {"--light", "A"}, 2, "the scene dark has no light");
   expect_refused(scene, {"--light", "D65"}, 2, "own light (--light)");
   EXPECT_EQ(simulate(scene, "a.dng").exit_code, 0);
 }
