@@ -2,7 +2,7 @@ cmake_minimum_required(VERSION 3.25)
 # Fails on what reads or writes numbers by the locale of the program that a library is part of. Commands have none: they
 # never call setlocale. cmake -DSOURCE_DIR=... -P locale_test.cmake
 set(by_locale "scanf *\\(" "strto[df]+ *\\(" "sto[df]+ *\\(" "atof *\\(" "stringstream" "printf *\\([^;]*%[-+ #0-9.*]*l?[aefgAEFG]")
-foreach(folder base codec model raw render output pipeline adapter)
+foreach(folder base bench codec cost gstreamer merge metrics model raw render reproduce output pipeline adapter python)
   file(GLOB_RECURSE found RELATIVE ${SOURCE_DIR} ${SOURCE_DIR}/isp/${folder}/*.cpp ${SOURCE_DIR}/isp/${folder}/*.h)
   list(APPEND files ${found})
 endforeach()
