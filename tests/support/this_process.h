@@ -8,7 +8,7 @@
 #include <iterator>
 #include <thread>
 
-/// These functions return what Linux reports that this process holds.
+/// These functions return what Linux reports that this process holds; WithoutRoot changes whose process it is.
 namespace lowlux::test {
 
 inline double resident_bytes() {
@@ -37,5 +37,21 @@ inline int settled_threads(int expected) {
   }
   return threads_now();
 }
+
+/// Makes the process of root one of an ordinary user for as long as it lives, so that permissions apply. Those of other
+/// users stay what they are.
+class WithoutRoot {
+ public:
+  WithoutRoot() : was_root_(geteuid() == 0 && seteuid(nobody) == 0) {}
+  ~WithoutRoot() {
+    if (was_root_ && seteuid(0) != 0) _exit(1);
+  }
+  WithoutRoot(const WithoutRoot&) = delete;
+  WithoutRoot& operator=(const WithoutRoot&) = delete;
+
+ private:
+  static constexpr uid_t nobody = 65534;
+  bool was_root_;
+};
 
 }  // namespace lowlux::test
