@@ -37,6 +37,11 @@ Result<isp::ExposureLimits> limits_of(const CaptureArgs& args, const capture::Ca
   out.max_factor = asked.max_gain.value_or(out.max_factor);
   out.mains = asked.mains.value_or(isp::Mains::either);
   out.clipped_fraction = asked.clipped_fraction.value_or(usual_clipped_fraction);
+  const auto least = std::ranges::min_element(controls.gains, {}, &capture::CameraGain::factor);
+  if (least != controls.gains.end() && out.max_factor < least->factor) {
+    return fail(ErrorCode::invalid_argument, fmt::format("is below the camera's smallest gain of {:g}", least->factor),
+                "--max-gain");
+  }
   return out;
 }
 

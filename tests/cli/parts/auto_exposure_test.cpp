@@ -247,3 +247,4 @@ TEST_F(AutoExposureOfCapture, IsReported) {
 
 }  // namespace
 }  // namespace lowlux
+  EXPECT_EQ(cli::AutoExposure::make(args_of({"--max-gain", "0.9"}), camera_).error().where, "--max-gain");
