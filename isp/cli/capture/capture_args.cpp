@@ -167,8 +167,8 @@ constexpr std::array of_pictures{"--bits",         "--quality",         "--space
                                  "--dimming",      "--noise-limit",     "--coefficients", "--display-luminance",
                                  "--gain-setting", "--chroma-bias",     "--light",        "--adaptation-degree",
                                  "--noise",        "--saturation-level"};
-constexpr std::array of_pictures_and_films{"--exposure",      "--wb",      "--tone",   "--look", "--scene-luminance",
-                                           "--field-of-view", "--profile", "--denoise"};
+constexpr std::array of_pictures_and_films{"--exposure",      "--wb",     "--tone", "--look", "--scene-luminance",
+                                           "--field-of-view", "--denoise"};
 
 /// Returns the first of these options that was given.
 std::optional<std::string> given_of(const CLI::App& app, std::span<const char* const> options) {
@@ -179,6 +179,7 @@ std::optional<std::string> given_of(const CLI::App& app, std::span<const char* c
 ArgumentError raw_output_error(const CLI::App& app, const CaptureArgs& args) {
   auto given = given_of(app, of_pictures);
   if (!given) given = given_of(app, of_pictures_and_films);
+  if (!given && !args.auto_exposure.wanted) given = given_of(app, std::array{"--profile"});
   if (given) return *given + " does not apply to raw files: use it with `develop`";
   const isp::BlackChoice black = args.develop.options.black.choice;
   if (!args.develop.black_profile.empty() ||
