@@ -114,6 +114,10 @@ Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<
   return GainAtIso{between(low, high, share), ""};
 }
 
+std::optional<double> only_iso(const CameraProfile& profile) {
+  return profile.gains.size() == 1 ? profile.gains[0].iso : std::nullopt;
+}
+
 Result<GainAtIso> gain_named(const CameraProfile& profile, const std::string& name) {
   const auto found = std::ranges::find(profile.gains, name, &GainProfile::gain_setting);
   if (found != profile.gains.end()) return GainAtIso{*found, ""};

@@ -20,6 +20,10 @@ struct GainAtIso {
 /// Errors: see profile_at.
 Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<double>& iso);
 
+/// Returns the ISO of the profile's only gain setting, which also holds for frames that state no ISO; absent if the
+/// profile has several settings, none, or states no ISO.
+std::optional<double> only_iso(const CameraProfile& profile);
+
 /// Returns the properties of a named gain setting.
 /// @param name  name of a setting, as in the profile ("gain 120"), or an ISO ("ISO 1600", "1600"), measured or not
 /// Errors: the profile has no such setting; see profile_at.

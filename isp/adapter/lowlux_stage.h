@@ -188,7 +188,7 @@ typedef struct {
   /* R, Gr, Gb, B, in codes of the input, 0..65535; a 16-bit value v of libcamera is v 2^bits / 65536 */
   float black_level[4];
   double exposure_s;      /* 1e-7..1e5 */
-  float analogue_gain;    /* 0.1..1e4; 1 is ISO 100 of the profile */
+  float analogue_gain;    /* 0.1..1e4; 1 is ISO 100 of the profile. Not valid: the profile's only setting, else 1 */
   float digital_gain;     /* already applied to the codes, 0.1..1e3; noise scales with it */
   float colour_gains[2];  /* R and B, relative to G = 1; 1e-3..1e3. Only ratios count: the smallest of the three is 1 */
   float colour_matrix[9]; /* rows; white-balanced camera RGB to linear sRGB; each within 1e3 */

@@ -136,7 +136,8 @@ Result<void> StageProfile::prepare(const RawFormat& format, BayerPhase phase) {
 std::optional<StageSensor> StageProfile::at(std::optional<double> analogue_gain, std::optional<double> exposure_s,
                                             std::optional<double> temperature_c) const {
   if (rows_.empty()) return std::nullopt;
-  const double iso = std::clamp(unit_iso * analogue_gain.value_or(1), rows_.front().iso, rows_.back().iso);
+  const double stated_iso = analogue_gain ? unit_iso * *analogue_gain : calib::only_iso(profile_).value_or(unit_iso);
+  const double iso = std::clamp(stated_iso, rows_.front().iso, rows_.back().iso);
   auto above = std::ranges::upper_bound(rows_, iso, {}, &Row::iso);
   if (above == rows_.end()) --above;
   const Row &b = *above, &a = above == rows_.begin() ? b : *(above - 1);

@@ -35,8 +35,8 @@ class StageProfile {
 
   /// Returns the figures for one frame. Allocates nothing. Gain and read noise are interpolated linearly in log-log
   /// between the profile's settings.
-  /// @param analogue_gain, exposure_s, temperature_c  if not known: gain 1, no dark charge, the
-  ///     temperature of the profile's darks
+  /// @param analogue_gain, exposure_s, temperature_c  if not known: the profile's only setting, else gain 1; no dark
+  ///     charge; the temperature of the profile's darks
   /// @return nullopt if the profile has no gain settings with a known system gain
   std::optional<StageSensor> at(std::optional<double> analogue_gain, std::optional<double> exposure_s,
                                 std::optional<double> temperature_c) const;

@@ -137,6 +137,22 @@ TEST(StageProfile, WhatIsNotKnownIsGainOneWithoutDarkCharge) {
   EXPECT_NEAR(stage->at(1, 3, std::nullopt)->dark_e[1], 12, 1e-12);  // 3 s of 4 e-/s at the darks' temperature
 }
 
+// As `lowlux develop` takes a frame that states no ISO.
+TEST(StageProfile, FramesWithoutGainHaveTheOnlySettingOfAProfile) {
+  CameraProfile profile;
+  profile.gains = {gain_at(800, 9, 1.5, 500)};
+  auto stage = StageProfile::of(profile);
+  ASSERT_TRUE(stage && stage->prepare(stream, BayerPhase::rggb));
+  const auto found = stage->at(std::nullopt, std::nullopt, std::nullopt);
+  RawDn frame = frame_of(stream, BayerPhase::rggb, 0, 0.01, 20);
+  frame.info.iso.reset();
+  const auto expected = calib::profile_at(profile, frame);
+  ASSERT_TRUE(found && expected && expected->sensor);
+  EXPECT_NEAR(found->gain_dn_per_e, expected->sensor->system_gain_dn_per_e / 4, 1e-9);
+  EXPECT_NEAR(found->read_noise_dn, 1.5 * 9 / 4, 1e-9);
+  EXPECT_NEAR(stage->at(1, std::nullopt, std::nullopt)->gain_dn_per_e, 9 / 4.0 / 8, 1e-3);
+}
+
 TEST(StageProfile, MonochromeStreamsHaveOneDarkCurrent) {
   CameraProfile profile = made_up();
   profile.mosaic = "monochrome";

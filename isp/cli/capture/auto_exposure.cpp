@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "calib/noise/exposure_gains.h"
+#include "calib/profile/gain_interpolation.h"
 #include "isp/base/camera_profile.h"
 #include "isp/base/packed/raw_format.h"
 #include "isp/cli/shared/exit_code.h"
@@ -18,6 +19,7 @@ namespace {
 
 constexpr double usual_frame_rate_hz = 30;
 constexpr double usual_clipped_fraction = 1e-3;
+constexpr double unit_iso = 100;  // ISO speed of an analogue gain of 1
 constexpr double first_exposure_s = 0.01;
 constexpr int latency_of_controls = 4;  // frames from a setting to its effect, at most
 constexpr double max_black = 0.25;      // of white: no camera has a higher pedestal
@@ -35,13 +37,13 @@ Result<isp::ExposureLimits> limits_of(const CaptureArgs& args, const capture::Ca
                 "--max-exposure");
   }
   out.max_factor = asked.max_gain.value_or(out.max_factor);
-  out.mains = asked.mains.value_or(isp::Mains::either);
-  out.clipped_fraction = asked.clipped_fraction.value_or(usual_clipped_fraction);
   const auto least = std::ranges::min_element(controls.gains, {}, &capture::CameraGain::factor);
   if (least != controls.gains.end() && out.max_factor < least->factor) {
     return fail(ErrorCode::invalid_argument, fmt::format("is below the camera's smallest gain of {:g}", least->factor),
                 "--max-gain");
   }
+  out.mains = asked.mains.value_or(isp::Mains::either);
+  out.clipped_fraction = asked.clipped_fraction.value_or(usual_clipped_fraction);
   return out;
 }
 
@@ -85,7 +87,10 @@ Result<std::unique_ptr<AutoExposure>> AutoExposure::make(const CaptureArgs& args
   std::vector<double> factors;
   factors.reserve(controls->gains.size());
   for (const capture::CameraGain& gain : controls->gains) factors.push_back(gain.factor);
-  if (factors.empty()) factors.push_back(args.request.analogue_gain.value_or(1));
+  if (factors.empty()) {
+    const auto iso = *profile ? calib::only_iso(**profile) : std::nullopt;
+    factors.push_back(args.request.analogue_gain.value_or(iso.value_or(unit_iso) / unit_iso));
+  }
   const double white_dn = largest_code(format.raw);
   auto gains = calib::exposure_gains(factors, format.raw, white_dn, *profile ? &**profile : nullptr);
   if (!gains) return tl::make_unexpected(with_file(gains.error(), args.develop.profile));

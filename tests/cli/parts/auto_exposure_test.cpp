@@ -13,7 +13,9 @@
 #include <variant>
 
 #include "capture/camera/capture_loop.h"
+#include "isp/base/camera_profile.h"
 #include "isp/cli/capture/capture_report.h"
+#include "isp/cli/shared/profile_option.h"
 #include "tests/support/scratch_directory.h"
 
 namespace lowlux {
@@ -217,8 +219,69 @@ TEST_F(AutoExposureOfCapture, KeepsToTheFrameRateTheMainsAndTheLargestGain) {
   EXPECT_EQ(found({"--max-gain", "2.5"}).gain->factor, 2);
 }
 
+// Raw files take nothing else of a profile, so `capture` refuses it for them without --auto-exposure.
+TEST_F(AutoExposureOfCapture, TakesTheNoiseOfAProfileForRawFilesToo) {
+  CameraProfile profile;
+  for (const double iso : {100.0, 800.0}) {  // the read noise is the same: no gain is better
+    GainProfile gain;
+    gain.iso = iso;
+    gain.sensor.emplace();
+    gain.sensor->bits = 12;
+    gain.sensor->white_level_dn = 4095;
+    gain.sensor->system_gain_dn_per_e = 4 * iso / 100;  // its rounding to codes is no noise
+    gain.sensor->full_well_e = 4095 / gain.sensor->system_gain_dn_per_e;
+    gain.sensor->read_noise_e = 3;
+    profile.gains.push_back(gain);
+  }
+  const std::string file = scratch_.file("camera.json");
+  const auto written = cli::write_profile(file, profile, isp::Overwrite::no);
+  ASSERT_TRUE(written) << written.error().message;
+  const auto gain_of = [&](const std::vector<std::string>& words) {
+    NightCamera camera;
+    camera.e_per_s = 5;
+    auto automatic = cli::AutoExposure::make(args_of(words), camera);
+    EXPECT_TRUE(automatic) << automatic.error().message;
+    for (int i = 0; i < 100; ++i) {
+      auto frame = camera.next({});
+      EXPECT_TRUE((*automatic)->take(*frame));
+    }
+    return camera.now.gain->factor;
+  };
+  EXPECT_GT(gain_of({"--mains", "off"}), 2);
+  EXPECT_EQ(gain_of({"--mains", "off", "--profile", file}), 1);
+  const std::string none = scratch_.file("none.json");
+  EXPECT_EQ(cli::AutoExposure::make(args_of({"--profile", none}), camera_).error().where, none);
+}
+
+// The gain of most V4L2 cameras is neither stated nor set: the noise is that of the gain that the profile was measured
+// at.
+TEST_F(AutoExposureOfCapture, CamerasThatStateNoGainHaveTheOnlySettingOfAProfile) {
+  CameraProfile profile;
+  GainProfile& only = profile.gains.emplace_back();
+  only.iso = 800;
+  only.sensor = SensorModel{
+      .system_gain_dn_per_e = 2, .read_noise_e = 3, .full_well_e = 2047, .bits = 12, .white_level_dn = 4095};
+  const std::string file = scratch_.file("camera.json");
+  const auto written = cli::write_profile(file, profile, isp::Overwrite::no);
+  ASSERT_TRUE(written) << written.error().message;
+  const auto snr_db_of = [&](const std::vector<std::string>& words) {
+    NightCamera camera;
+    camera.controls.gains.clear();
+    auto automatic = cli::AutoExposure::make(args_of(words), camera);
+    EXPECT_TRUE(automatic) << automatic.error().message;
+    for (int i = 0; i < 40; ++i) {
+      auto frame = camera.next({});
+      EXPECT_TRUE((*automatic)->take(*frame));
+    }
+    return (*automatic)->state().snr_db;
+  };
+  EXPECT_EQ(snr_db_of({"--profile", file}), snr_db_of({"--profile", file, "--gain", "8"}));
+  EXPECT_NE(snr_db_of({"--profile", file}), snr_db_of({"--profile", file, "--gain", "1"}));
+}
+
 TEST_F(AutoExposureOfCapture, PassesErrorsOfTheCameraOn) {
   EXPECT_EQ(cli::AutoExposure::make(args_of({"--max-exposure", "0.00001"}), camera_).error().where, "--max-exposure");
+  EXPECT_EQ(cli::AutoExposure::make(args_of({"--max-gain", "0.9"}), camera_).error().where, "--max-gain");
   camera_.failing_set = 2;
   auto automatic = cli::AutoExposure::make(args_of({}), camera_);
   ASSERT_TRUE(automatic);
@@ -247,4 +310,3 @@ TEST_F(AutoExposureOfCapture, IsReported) {
 
 }  // namespace
 }  // namespace lowlux
-  EXPECT_EQ(cli::AutoExposure::make(args_of({"--max-gain", "0.9"}), camera_).error().where, "--max-gain");
