@@ -39,7 +39,8 @@ constexpr std::array<Number, 14> numbers{{
     {"noise-gain", "System gain",
      "Codes per electron; below 1e-6: that of the profile, else measured. Requires noise-read", 0, 65535,
      &Properties::noise_gain_dn_per_e},
-    {"noise-read", "Read noise", "Standard deviation of a pixel without light, in codes; below 0: not known", -1, 65535,
+    {"noise-read", "Read noise",
+     "Standard deviation of a pixel without light, in codes; below 0: not known. Requires noise-gain", -1, 65535,
      &Properties::noise_read_dn},
     {"red-gain", "Gain of red", "Gain of red for white, relative to green; below 0.001: estimated. Requires blue-gain",
      0, 1e3, &Properties::red_gain},
@@ -263,9 +264,9 @@ const char* Properties::without_effect() const {
   const bool red = red_gain >= min_colour_gain, blue = blue_gain >= min_colour_gain;
   if (red && !blue) return "red-gain has no effect: it requires blue-gain";
   if (blue && !red) return "blue-gain has no effect: it requires red-gain";
-  if (noise_gain_dn_per_e >= min_noise_gain && noise_read_dn < min_noise_read) {
-    return "noise-gain has no effect: it requires noise-read";
-  }
+  const bool gain = noise_gain_dn_per_e >= min_noise_gain, read = noise_read_dn >= min_noise_read;
+  if (gain && !read) return "noise-gain has no effect: it requires noise-read";
+  if (read && !gain) return "noise-read has no effect: it requires noise-gain";
   return nullptr;
 }
 

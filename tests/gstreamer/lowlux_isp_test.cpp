@@ -380,6 +380,8 @@ TEST(LowluxIsp, WarnsOnceOfAPropertyWithoutTheOneItRequires) {
   g_object_set(harness->element, "red-gain", 0.0, "noise-read", 1.5, nullptr);
   expect_warnings({"blue-gain has no effect: it requires red-gain"});
   gst_element_set_bus(harness->element, nullptr);
+  g_object_set(harness->element, "blue-gain", 0.0, "noise-gain", 0.0, nullptr);
+  expect_warnings({"noise-read has no effect: it requires noise-gain"});
 }
 
 TEST(LowluxIsp, RefusesCapsThatSayTooLittle) {
