@@ -15,6 +15,7 @@
 #include "capture/file/picture_colour.h"
 #include "capture/file/picture_light.h"
 #include "capture/file/picture_source.h"
+#include "isp/base/file_extension.h"
 #include "isp/codec/exr.h"
 #include "isp/metrics/picture_metrics.h"
 #include "isp/raw/kernel/raw_to_rgb.h"
@@ -51,7 +52,7 @@ Result<SceneLinear> wide_light(DecodedPicture& decoded, Executor& executor) {
 }
 
 Result<SceneLinear> picture_xyz(const std::string& path, Executor& executor) {
-  if (path.ends_with(".exr")) {
+  if (has_extension(path, ".exr")) {
     std::ifstream file(path, std::ios::binary);
     const std::string bytes((std::istreambuf_iterator<char>(file)), {});
     auto decoded = decode_exr(std::as_bytes(std::span(bytes)));
@@ -150,7 +151,7 @@ Result<BenchPicture> read_bench_picture(const std::string& path, int crop_width,
     return fail(ErrorCode::insufficient,
                 "the image is smaller than " + std::to_string(metric_patch_px) + " pixels, the side of a patch", path);
   }
-  const SceneLinear display = shown(*xyz, path.ends_with(".exr") || path.ends_with(".pfm"), executor);
+  const SceneLinear display = shown(*xyz, has_extension(path, ".exr") || has_extension(path, ".pfm"), executor);
   const int width = crop_width > 0 ? std::min(crop_width, display.width()) : display.width();
   const int height = crop_height > 0 ? std::min(crop_height, display.height()) : display.height();
   BenchPicture out{std::filesystem::path(path).filename().string(), SceneLinear(width, height)};

@@ -6,10 +6,17 @@
 #include <limits>
 #include <vector>
 
+#include "isp/base/file_extension.h"
 #include "tests/support/comma_locale.h"
 
 namespace lowlux {
 namespace {
+
+TEST(HasExtension, IgnoresTheCaseOfAsciiLettersOnly) {
+  for (const char* name : {"a.dng", "A.DNG", "b/a.Dng", ".dng"}) EXPECT_TRUE(has_extension(name, ".dng")) << name;
+  for (const char* name : {"", "dng", "a.dng.tif", "a-dng", "a.\xC4ng", "a.dn"})
+    EXPECT_FALSE(has_extension(name, ".dng")) << name;
+}
 
 TEST(NumberText, IsThatOfPrintfWithADecimalPointUnderAnyLocale) {
   const std::vector<double> values = {0,

@@ -130,6 +130,7 @@ TEST_F(DenoiseCommand, TheNoiseIsThatOfTheProfileIfThereIsOne) {
 TEST_F(DenoiseCommand, RefusesWhatCannotBe) {
   const std::string night = file("night.dng");
   refused({"denoise", night, "-o", file("clean.tif")}, 2, "must end with .dng");
+  refused({"denoise", file("missing.dng"), "-o", file("CLEAN.DNG")}, 1, "missing.dng");
   refused({"denoise", night, "-o", night}, 2, "would replace the input");
   refused({"denoise", night, "-o", file("clean.dng"), "--denoise", "off"}, 2, "none of auto");
   refused({"denoise", night, "-o", file("clean.dng"), "--denoise", "finest"}, 2, "is none of");

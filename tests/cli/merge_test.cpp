@@ -355,6 +355,7 @@ TEST_F(MergeCommand, RefusesWhatCannotBeMerged) {
   refused({frames_[0], file("broken.dng")}, {}, 1, "broken.dng");
   EXPECT_EQ(lowlux({"merge", frames_[0], "-o", frames_[0], "--force"}).exit_code, 2);
   EXPECT_EQ(lowlux({"merge", frames_[0], "-o", file("merged.png")}).exit_code, 2);
+  EXPECT_EQ(lowlux({"merge", frames_[0], "-o", file("MERGED.DNG")}).exit_code, 0);
   EXPECT_EQ(lowlux({"develop", frames_[0], "-o", file("out.png"), "--align", "none"}).exit_code, 2);
   ASSERT_EQ(merge(frames_).exit_code, 0);
   const auto again = merge(frames_);

@@ -108,6 +108,15 @@ def test_a_text_without_an_end_or_with_one_inside_is_no_path(night, tmp_path, rn
     assert list(tmp_path.iterdir()) == []
 
 
+def test_extensions_may_be_in_capitals(night, tmp_path):
+    raw = lowlux.read_raw(night)
+    lowlux.write_dng(tmp_path / "A.DNG", raw)
+    assert lowlux.merge([raw], tmp_path / "M.DNG").plan["alignment"] == "none"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["A.DNG", "M.DNG"]
+    with pytest.raises(lowlux.ArgumentError):
+        lowlux.merge([raw], tmp_path / "M.TIF")
+
+
 def test_names_of_any_bytes_and_bytes_themselves_are_paths(night, tmp_path):
     raw = lowlux.read_raw(night)
     folder = os.fsencode(tmp_path) + b"/\xff\xfe"

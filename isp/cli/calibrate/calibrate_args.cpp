@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "isp/base/file_extension.h"
 #include "isp/cli/shared/exit_code.h"
 #include "isp/cli/shared/option_values.h"
 #include "isp/cli/shared/outputs.h"
@@ -48,8 +49,9 @@ std::string settings_error(const CalibrateArgs& args) {
 /// Returns the error of the arguments in combination; empty if there is none.
 std::string wrong(const CalibrateArgs& args, const std::vector<std::string>& inputs) {
   if (std::string what = settings_error(args); !what.empty()) return what;
-  if (!args.output.ends_with(".json")) return "-o: the name of a profile must end with .json, found " + args.output;
-  if (!args.report.empty() && !args.report.ends_with(".html"))
+  if (!has_extension(args.output, ".json"))
+    return "-o: the name of a profile must end with .json, found " + args.output;
+  if (!args.report.empty() && !has_extension(args.report, ".html"))
     return "--report: the name of a page must end with .html, found " + args.report;
   return file_name_error({args.output, args.report}, inputs);
 }
@@ -207,7 +209,7 @@ Parsed<CalibrateSheetArgs> parse_calibrate_sheet(const std::vector<std::string>&
   }
   if (light.any()) args.irradiance = light.light();
   if (args.darks.size() == 1) return refuse(app, one_dark(args.darks.front()));
-  if (!args.common.output.ends_with(".html"))
+  if (!has_extension(args.common.output, ".html"))
     return refuse(app, "-o: the name of a page must end with .html, found " + args.common.output);
   if (const std::string what = settings_error(args.common); !what.empty()) return refuse(app, what);
   std::vector<std::string> inputs = args.common.frames;
@@ -238,9 +240,9 @@ namespace {
 /// Returns the error of the output files; empty if there is none.
 std::string wrong_files(const CalibrateColourArgs& args) {
   if (args.output.empty()) return "-o is required: the profile to write";
-  if (!args.output.ends_with(".json"))
+  if (!has_extension(args.output, ".json"))
     return fmt::format("-o: the name of a profile must end with .json, found {}", args.output);
-  if (!args.report.empty() && !args.report.ends_with(".html")) {
+  if (!args.report.empty() && !has_extension(args.report, ".html")) {
     return fmt::format("--report: the name of a page must end with .html, found {}", args.report);
   }
   if (!args.overlay.empty()) {

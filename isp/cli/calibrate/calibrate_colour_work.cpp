@@ -12,6 +12,7 @@
 #include "calib/chart/spectral_colour.h"
 #include "capture/file/dng_source.h"
 #include "capture/file/spectra_file.h"
+#include "isp/base/file_extension.h"
 #include "isp/base/text.h"
 #include "isp/cli/shared/machine.h"
 #include "isp/cli/shared/module.h"
@@ -224,7 +225,7 @@ class ChartCalibration {
 using Sensitivity = std::array<Spectrum, 3>;
 
 Result<Sensitivity> sensitivity_of(const CalibrateColourArgs& args) {
-  if (!args.camera.ends_with(".csv")) {
+  if (!has_extension(args.camera, ".csv")) {
     if (args.per_photon) {
       return fail(ErrorCode::invalid_argument, "the cameras of the table are per unit of power", "--per-photon");
     }
@@ -280,7 +281,7 @@ Result<ColourOutcome> colour_from_spectra(const CalibrateColourArgs& args) {
 
   ColourOutcome out;
   out.input = args.camera;
-  if (!args.camera.ends_with(".csv")) out.model = args.camera;
+  if (!has_extension(args.camera, ".csv")) out.model = args.camera;
   out.illuminant_reason = args.illuminant.empty() ? "the default" : "as asked";
   for (std::size_t i = 0; i < 24; ++i) out.reference[i] = isp::lab_of(colour->reference[i], colour->white);
   out.matrices = {errors_of("printed", "Eq. 4.14 as printed", colour->printed, colour->white),

@@ -11,6 +11,7 @@
 #include "calib/noise/raspberry_tuning.h"
 #include "calib/profile/quoted_profile.h"
 #include "capture/file/file_bytes.h"
+#include "isp/base/file_extension.h"
 #include "isp/cli/calibrate/calibrate_colour.h"
 #include "isp/cli/calibrate/calibration.h"
 #include "isp/cli/help/help_text.h"
@@ -77,7 +78,7 @@ Result<CameraProfile> profile_of_file(const std::string& file) {
 }
 
 Result<CameraProfile> quoted_profile_of(const std::string& sensor) {
-  if (sensor.ends_with(".json")) return profile_of_file(sensor);
+  if (has_extension(sensor, ".json")) return profile_of_file(sensor);
   if (auto known = calib::raspberry_profile(sensor)) return *std::move(known);
   auto profile = calib::quoted_profile(sensor);
   if (!profile && profile.error().code == ErrorCode::invalid_argument) {

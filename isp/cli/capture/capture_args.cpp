@@ -11,8 +11,8 @@
 #include <CLI/CLI.hpp>
 
 #include "capture/camera/camera_request.h"
+#include "isp/base/file_extension.h"
 #include "isp/base/packed/raw_format.h"
-#include "isp/base/text.h"
 #include "isp/cli/develop/develop_args.h"
 #include "isp/cli/develop/look_args.h"
 #include "isp/cli/shared/option_values.h"
@@ -240,9 +240,7 @@ ArgumentError set_kind(const Words& words, CaptureArgs& args) {
     return std::nullopt;
   }
   if (!words.as.empty()) return "--as requires a folder as output; the name of a file states its format";
-  std::string end = fs::path(output).extension().string();
-  std::ranges::transform(end, end.begin(), ascii_lower);
-  args.kind = end == ".dng" ? CaptureKind::raw : CaptureKind::pictures;
+  args.kind = has_extension(output, ".dng") ? CaptureKind::raw : CaptureKind::pictures;
   if (words.raw && args.kind != CaptureKind::raw) return "--raw writes .dng files: name one instead of " + output;
   if (args.kind == CaptureKind::pictures) {
     if (const auto format = isp::format_of(output); !format) return format.error().message + " or .dng";

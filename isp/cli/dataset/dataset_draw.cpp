@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isp/base/file_extension.h"
 #include "isp/base/random/random.h"
 #include "isp/cli/shared/lines.h"
 
@@ -44,11 +45,11 @@ std::string option_text(const std::string& json) {
 /// Returns the value of an option: names of files are relative to the spec.
 std::string option_value(const DatasetSpec& spec, const Setting& setting, const std::string& value) {
   const std::string text = option_text(value);
-  return setting.key == "light" && text.ends_with(".csv") ? path_in(spec, text) : text;
+  return setting.key == "light" && has_extension(text, ".csv") ? path_in(spec, text) : text;
 }
 
 std::string scene_path(const DatasetSpec& spec, const std::string& scene) {
-  if (scene.starts_with("chart:") && scene.ends_with(".csv")) return "chart:" + path_in(spec, scene.substr(6));
+  if (scene.starts_with("chart:") && has_extension(scene, ".csv")) return "chart:" + path_in(spec, scene.substr(6));
   return is_generated(scene) ? scene : path_in(spec, scene);
 }
 

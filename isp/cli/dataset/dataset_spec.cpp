@@ -13,6 +13,7 @@
 
 #include "calib/profile/json_keys.h"
 #include "capture/file/file_bytes.h"
+#include "isp/base/file_extension.h"
 #include "isp/base/json_text.h"
 #include "isp/base/text.h"
 #include "isp/cli/shared/option_values.h"
@@ -228,14 +229,14 @@ Result<void> set_inputs(DatasetSpec& spec) {
   std::set<std::pair<std::string, std::string>> named;  // file, key
   for (const std::string& scene : spec.scenes) {
     if (!is_generated(scene)) named.emplace(scene, "scenes");
-    if (scene.starts_with("chart:") && scene.ends_with(".csv")) named.emplace(scene.substr(6), "scenes");
+    if (scene.starts_with("chart:") && has_extension(scene, ".csv")) named.emplace(scene.substr(6), "scenes");
   }
   for (const DatasetSensor& sensor : spec.sensors) {
     for (const DrawnSetting& drawn : sensor.settings) {
       if (drawn.setting->key != "light") continue;
       for (const std::string& choice : drawn.distribution.choices) {
         const SortedJson light = SortedJson::parse(choice);
-        if (light.is_string() && light.get<std::string>().ends_with(".csv")) named.emplace(light, "light");
+        if (light.is_string() && has_extension(light.get<std::string>(), ".csv")) named.emplace(light, "light");
       }
     }
   }

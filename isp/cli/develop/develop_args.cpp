@@ -8,6 +8,7 @@
 
 #include "calib/dark/master_dark.h"
 #include "denoise/denoiser.h"
+#include "isp/base/file_extension.h"
 #include "isp/cli/develop/image_args.h"
 #include "isp/cli/noise/noise_source.h"
 #include "isp/cli/shared/option_values.h"
@@ -269,7 +270,7 @@ std::optional<std::string> set_black(const std::string& text, DevelopArgs& args)
   } else if (const auto figures = site_figures(text)) {
     request.choice = isp::BlackChoice::given;
     request.given_dn = *figures;
-  } else if (text.ends_with(".json")) {
+  } else if (has_extension(text, ".json")) {
     args.black_profile = text;
   } else {
     return fmt::format("is neither {} nor one or four numbers in DN nor a profile (PROFILE.json)", joined(names));
@@ -419,7 +420,7 @@ void add_darks(CLI::App& app, DarkArgs& dark) {
            [&dark](const std::string& text) -> std::optional<std::string> {
              dark.doubling_c = quantity_of(text, "C");
              if (!dark.doubling_c) {
-               if (!text.ends_with(".json")) return "is neither a number of degrees nor a profile (.json)";
+               if (!has_extension(text, ".json")) return "is neither a number of degrees nor a profile (.json)";
                dark.doubling_profile = text;
              } else if (!(*dark.doubling_c >= 2 && *dark.doubling_c <= 30)) {
                return "is not within 2 to 30 degrees";

@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
+#include "isp/base/file_extension.h"
 #include "isp/cli/shared/option_values.h"
 #include "isp/model/appearance/appearance_model.h"
 #include "isp/model/vision/scene_light.h"
@@ -62,7 +63,7 @@ void add_scene(CLI::App& app, LookArgs& args) {
 ArgumentError set_light(const std::string& text, LookArgs& args) {
   args.choice.light.reset();
   args.light_file.clear();
-  if (text.ends_with(".csv")) {
+  if (has_extension(text, ".csv")) {
     args.light_file = text;
     return std::nullopt;
   }

@@ -10,6 +10,7 @@
 
 #include "capture/decoder/decoded_raw.h"
 #include "capture/file/file_bytes.h"
+#include "isp/base/file_extension.h"
 #include "isp/base/image.h"
 #include "isp/codec/tiff.h"
 
@@ -61,12 +62,7 @@ Result<Plane<float>> grey_of(const SceneLinear& picture) {
 
 }  // namespace
 
-bool is_tiff_name(const std::string& file) {
-  std::string name = file;
-  std::ranges::transform(name, name.begin(),
-                         [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return name.ends_with(".tif") || name.ends_with(".tiff");
-}
+bool is_tiff_name(const std::string& file) { return has_extension(file, ".tif") || has_extension(file, ".tiff"); }
 
 Result<MosaicTiff> mosaic_of(RawFrame frame, const std::string& file) {
   if (frame.raw.layout == SensorLayout::linear_rgb) {

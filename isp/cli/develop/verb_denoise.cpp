@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "isp/base/file_extension.h"
 #include "isp/cli/develop/calibration_files.h"
 #include "isp/cli/develop/develop_args.h"
 #include "isp/cli/develop/develop_work.h"
@@ -20,7 +21,7 @@ int run_denoise(const std::vector<std::string>& words) {
 
   Result<std::vector<Job>> jobs = plan_outputs(args, "dng");
   if (!jobs) return print_argument_error("denoise", jobs.error(), args.defaults, json);
-  if (!jobs->front().output.ends_with(".dng") && !is_standard_stream(jobs->front().output)) {
+  if (!has_extension(jobs->front().output, ".dng") && !is_standard_stream(jobs->front().output)) {
     return print_usage_error(
         "denoise",
         {ErrorCode::invalid_argument, "denoised raw files are written as DNG: the name must end with .dng", "-o"},

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "isp/base/file_extension.h"
 #include "isp/cli/shared/option_values.h"
 #include "isp/cli/shared/sensor_options.h"
 
@@ -122,7 +123,7 @@ std::string validate_advise(const CLI::App& app, const AdviseArgs& args, std::si
     return "--advise without a raw file needs --highlight, as a luminance or as 20x";
   }
   if (args.snr_db) return "--snr and --sensor are mutually exclusive: --snr applies to frames for a merge";
-  if (!args.report.empty() && !args.report.ends_with(".html")) {
+  if (!args.report.empty() && !has_extension(args.report, ".html")) {
     return "--report writes a page, whose name must end with .html, found " + args.report;
   }
   if (!args.longest_exposure_s && !args.speed_px_per_s) {

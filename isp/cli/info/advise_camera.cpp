@@ -11,6 +11,7 @@
 
 #include "isp/base/camera_profile.h"
 #include "isp/base/executor.h"
+#include "isp/base/file_extension.h"
 #include "isp/base/text.h"
 #include "isp/cli/shared/profile_option.h"
 #include "isp/model/colour/camera_colour.h"
@@ -255,7 +256,7 @@ Result<AdviceCase> advice_case(const AdviseArgs& args, const RawFrame* frame) {
   optics.f_number = args.f_number.value_or(frame != nullptr ? *frame->raw.info.f_number : optics.f_number);
   AdviceCase out;
   if (auto scene = take_scene(args, frame, out); !scene) return tl::make_unexpected(scene.error());
-  const bool profile = args.sensor.ends_with(".json");
+  const bool profile = has_extension(args.sensor, ".json");
   auto camera = profile ? take_profile(args, *light, optics, out) : take_named(args, *light, optics, out);
   if (!camera) return tl::make_unexpected(camera.error());
   return out;

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "isp/base/file_extension.h"
 #include "isp/cli/develop/calibration_files.h"
 #include "isp/cli/develop/develop_args.h"
 #include "isp/cli/merge/merge_files.h"
@@ -27,7 +28,7 @@ struct Files {
 Result<Files> input_files(const DevelopArgs& args) {
   Files out;
   out.output = {{}, args.output, args.force ? isp::Overwrite::yes : isp::Overwrite::no};
-  if (!args.output.ends_with(".dng")) {
+  if (!has_extension(args.output, ".dng")) {
     return fail(ErrorCode::invalid_argument, "merged raw files are written as DNG: the name must end with .dng", "-o");
   }
   Result<std::vector<std::string>> inputs = files_to_merge(args);

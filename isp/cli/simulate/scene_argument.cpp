@@ -11,6 +11,7 @@
 
 #include "capture/file/picture_source.h"
 #include "capture/file/spectra_file.h"
+#include "isp/base/file_extension.h"
 #include "isp/base/text.h"
 #include "isp/cli/shared/option_values.h"
 #include "isp/model/spectrum/cie_data.h"
@@ -19,7 +20,7 @@
 namespace lowlux::cli {
 namespace {
 
-bool names_table(const std::string& text) { return text.ends_with(".csv"); }
+bool names_table(const std::string& text) { return has_extension(text, ".csv"); }
 
 /// Resamples a light to at most 5 nm where sensors and eyes may respond: integrals use the light's own nodes alone.
 Result<Spectrum> finely_sampled(const Spectrum& light) {

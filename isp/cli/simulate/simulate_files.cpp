@@ -1,11 +1,13 @@
 #include "isp/cli/simulate/simulate_files.h"
 
 #include <filesystem>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "isp/base/file_extension.h"
 #include "isp/cli/shared/outputs.h"
 #include "isp/output/picture/image_writer.h"
 
@@ -14,12 +16,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns the output without ".dng".
-std::string stem_of(const SimulateArgs& args) { return args.output.substr(0, args.output.size() - 4); }
+constexpr std::string_view raw_extension = ".dng";
+
+/// Returns the output without its extension.
+std::string stem_of(const SimulateArgs& args) {
+  return args.output.substr(0, args.output.size() - raw_extension.size());
+}
 
 std::string frame_file(const SimulateArgs& args, int index) {
   if (args.frames == 1 || args.output.empty()) return args.output;
-  return fmt::format("{}_{:04}.dng", stem_of(args), index);
+  return fmt::format("{}_{:04}{}", stem_of(args), index, args.output.substr(args.output.size() - raw_extension.size()));
 }
 
 }  // namespace
@@ -44,7 +50,8 @@ SimulateFiles files_of(const SimulateArgs& args) {
 std::string wrong_files(const SimulateArgs& args) {
   if (args.scene.what.empty()) return "SCENE is required: an image, or dark, flat, chart; --help lists the options";
   if (args.output.empty()) return "-o is required: the raw file to write";
-  if (!args.output.ends_with(".dng")) return fmt::format("-o: raw files are written as .dng, not as {}", args.output);
+  if (!has_extension(args.output, raw_extension))
+    return fmt::format("-o: raw files are written as .dng, not as {}", args.output);
   std::vector<std::string> pictures;
   if (!args.truth.empty()) pictures.push_back(args.truth);
   if (!args.truth_electrons.empty()) pictures.push_back(args.truth_electrons);

@@ -82,7 +82,7 @@ def write_dng(path, mosaic, *, black=None, white=None, cfa=None, noise=None, mat
     Errors: those of raw_from_array; ExistsError, UnwritableError, TooLargeError.
     """
     path = bytes_of(path, "path")
-    if not path.endswith(b".dng"):
+    if not path.lower().endswith(b".dng"):
         name = os.fsdecode(path)
         raise _errors.ArgumentError(f"{name}: a raw file is written as DNG: its name ends with .dng", name)
     figures = dict(black=black, white=white, cfa=cfa, noise=noise, matrix=matrix, exposure_s=exposure_s, iso=iso,

@@ -160,6 +160,6 @@ def merge(raws, output=None, *, overwrite=False, compression=None, align=None, f
 
 def _check_dng(output):
     path = output_of(output)
-    if path and not path.endswith(b".dng"):
+    if path and not path.lower().endswith(b".dng"):
         name = os.fsdecode(path)
         raise ArgumentError(f"{name}: raw files are written as DNG: the name must end with .dng", name)

@@ -299,12 +299,18 @@ TEST_F(SimulateInput, FilesThatCannotBeWrittenAreRefusedBeforeAnyIs) {
   expect_refused("flat", {"--truth", file("absent/t.exr")}, 1, "no directory");
   expect_refused("flat", {"--truth-electrons", file("absent/t.exr")}, 1, "no directory");
   expect_refused("flat", {"--truth", file("folder.exr"), "--force"}, 1, "is a directory");
-  for (const char* name : {"absent/a.dng", "a.tif", "a.DNG", "a"}) {
+  for (const char* name : {"absent/a.dng", "a.tif", "a.dng.tif", "a"}) {
     const auto result = simulate("flat", name);
     EXPECT_EQ(result.exit_code, std::string(name).starts_with("absent") ? 1 : 2) << result.err;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   }
   EXPECT_EQ(scratch_.names(), Words{"folder.exr"});
+}
+
+TEST_F(SimulateInput, TheExtensionMayBeInCapitals) {
+  simulated("flat", "A.DNG");
+  simulated("flat", "B.DNG", {"--frames", "2", "--no-truth"});
+  EXPECT_EQ(scratch_.names(), (Words{"A.DNG", "A.truth.exr", "B_0000.DNG", "B_0001.DNG"}));
 }
 
 TEST_F(SimulateInput, ATruthNeverReplacesItsScene) {
