@@ -13,7 +13,6 @@ constexpr int first_mean = 8;              // frames, of which the reference is 
 constexpr int last_mean = 256;             // merge::ColourMean holds no more frames
 constexpr double colour_fraction = 0.4;    // of the time of placing a frame: adding it to the mean of all colours
 constexpr double colour_prediction = 4.5;  // times the first prediction: developing all colours at every pixel
-constexpr int motion_frames = 2;           // in which the motion of the camera is measured
 
 /// Returns of how many of the frames the reference is predicted last, at most.
 int last_of(int frames) { return std::min(frames / 2, last_mean); }

@@ -11,6 +11,9 @@ namespace lowlux::isp {
 /// Frames whose mean is compared with the others, of a camera at rest and of stars.
 inline constexpr int sampled_frames = 5;
 
+/// Frames in which the motion of the camera is measured, if there are as many without the reference.
+inline constexpr int motion_frames = 2;
+
 /// Returns whether a sub-pixel merge of `frames` frames predicts the reference anew once so many are averaged: at 8,
 /// 16 ... 256 frames, where at least as many are still to come. Drops blur what a prediction lacks, such as detail that
 /// noise hides in a single frame.

@@ -19,12 +19,19 @@ bool has_moved(const merge::Motion& motion) {
   return motion.found && merge::median_shift_px(motion) > std::max(still_px, 5 * motion.standard_error_px);
 }
 
-/// Measures the motion of the last frame and of one in the middle.
-Result<void> measure_motion(MergeContext& work, MergeChoice& choice) {
-  std::vector<int> order;
-  for (const int index : {work.count - 1, work.count / 2}) {
-    if (index != work.out.reference && (order.empty() || order.front() != index)) order.push_back(index);
+/// Returns the frames in which the motion of the camera is measured: two, if the reference is one of several.
+std::vector<int> measured_frames(const MergeContext& work) {
+  std::vector<int> out;
+  for (const int index : {work.count - 1, work.count / 2, 0}) {
+    const bool is_new = index != work.out.reference && std::ranges::find(out, index) == out.end();
+    if (is_new && out.size() < motion_frames) out.push_back(index);
   }
+  return out;
+}
+
+/// Measures the motion of the camera.
+Result<void> measure_motion(MergeContext& work, MergeChoice& choice) {
+  const std::vector<int> order = measured_frames(work);
   Executor& executor = work.executor;
   const auto reference = with_unshaded(
       work.reference, executor, [&](const merge::FrameView& view) { return merge::AlignReference(view, executor); });

@@ -20,8 +20,9 @@ struct MergeChoice {
   std::string warning;                   // empty: none
 };
 
-/// Chooses as the options state; what they leave open by the motion of the last frame and of one in the middle, and by
-/// the budget in the options of the reference (ProcessingGoal). Errors: those of reading these frames.
+/// Chooses as the options state; what they leave open by the motion of two frames, the last, a middle and the first one
+/// but the reference, and by the budget in the options of the reference (ProcessingGoal). Errors: those of reading
+/// these frames.
 Result<MergeChoice> choose_merge(MergeContext& work);
 
 }  // namespace lowlux::isp

@@ -37,6 +37,16 @@ TEST(MergeMoving, GainsNearlyAsMuchAsFramesAtRest) {
   }
 }
 
+TEST(MergeMoving, TheMotionOfTheCameraIsFoundForEveryReference) {
+  const Burst burst = hand_held(20);
+  for (const int count : {2, 3, 4}) {
+    for (int reference = 0; reference < count; ++reference) {
+      const MergedRaw merged = burst.merged(count, {.reference = reference});
+      EXPECT_EQ(merged.alignment, MergeAlignment::subpixel) << count << " frames, reference " << reference;
+    }
+  }
+}
+
 // Waves of 3.5 pixels with 0.7 of the noise of a frame, which noise reduction of a single frame removes. A mean over
 // drops of radius 1.5 px keeps sinc^2(1.5 / 3.5) = 0.52 of their contrast, over drops of 1 px 0.76. The mean of 8
 // frames has a signal-to-noise ratio of 11.5, for which drops have 1.05 px.
