@@ -247,9 +247,11 @@ Result<FrameElectrons> FrameLoader::electrons_of(const FrameToMerge& read) {
 
 Result<double> FrameLoader::stated_light() const {
   const FrameInfo& info = reference_.frame.raw.info;
-  if (!info.exposure_s || !last_.exposure_s || !(*info.exposure_s > 0) || !(*last_.exposure_s > 0)) {
-    return tl::make_unexpected(at_frame(
-        {ErrorCode::insufficient, "frames of different exposure must state their exposure times", {}}, last_name_));
+  const auto states_time = [](const FrameInfo& of) { return of.exposure_s && *of.exposure_s > 0; };
+  if (!states_time(info) || !states_time(last_)) {
+    return tl::make_unexpected(
+        at_frame({ErrorCode::insufficient, "frames of different exposure must state their exposure times", {}},
+                 states_time(last_) ? reference_.name : last_name_));
   }
   double light = *last_.exposure_s / *info.exposure_s;
   if (info.f_number && last_.f_number) light *= std::pow(*info.f_number / *last_.f_number, 2);

@@ -36,6 +36,8 @@ class FrameLoader {
   RawFrame& reference() { return reference_.frame; }
   const DevelopOptions& reference_options() const { return reference_.options; }
   const std::string& reference_name() const { return reference_.name; }
+  /// Returns the name of the frame that next() returned last.
+  const std::string& last_name() const { return last_name_; }
 
   /// States the frames that next() returns, in this order.
   void expect(std::vector<int> order);

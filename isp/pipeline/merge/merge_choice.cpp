@@ -36,6 +36,7 @@ Result<void> measure_motion(MergeContext& work, MergeChoice& choice) {
   const auto reference = with_unshaded(
       work.reference, executor, [&](const merge::FrameView& view) { return merge::AlignReference(view, executor); });
   work.loader.expect(order);
+  bool is_known = false;
   for (const int index : order) {
     Result<FrameElectrons> frame = work.loader.next();
     if (!frame) return tl::make_unexpected(frame.error());
@@ -44,11 +45,18 @@ Result<void> measure_motion(MergeContext& work, MergeChoice& choice) {
     merge::Motion motion = with_unshaded(*frame, executor, [&](const merge::FrameView& view) {
       return merge::find_motion(reference, view, *light, {}, executor);
     });
+    is_known = is_known || motion.found;
     if (has_moved(motion)) choice.method.alignment = MergeAlignment::subpixel;
     choice.motions.emplace(index, std::move(motion));
   }
   choice.bracket = work.loader.exposures_differ();
   if (choice.bracket) choice.motions.clear();
+  if (choice.bracket && !is_known) {
+    choice.warnings.push_back(fmt::format(
+        "{} could not be aligned with {}, whose exposure differs: the frames are merged as those of a camera at rest; "
+        "if it moved, leave that frame out or name another --reference, else give --align none",
+        work.loader.last_name(), work.loader.reference_name()));
+  }
   work.clock.lap("motion of the camera");
   return {};
 }
@@ -85,10 +93,10 @@ Result<MergeChoice> choose_merge(MergeContext& work) {
   choice.plan = choose_merge_method(*goal->cost, amount, budget_s, moved);
   choice.method = choice.plan->method;
   if (!choice.plan->fits) {
-    choice.warning = fmt::format(
+    choice.warnings.push_back(fmt::format(
         "merging is predicted to take at least {:.0f} ms, more than the budget of {:.3g} ms: the cheapest method was "
         "used",
-        1e3 * choice.plan->predicted_s, 1e3 * budget_s);
+        1e3 * choice.plan->predicted_s, 1e3 * budget_s));
   }
   return chosen({});
 }

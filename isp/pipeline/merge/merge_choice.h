@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "isp/base/result.h"
 #include "isp/merge/motion.h"
@@ -17,7 +18,7 @@ struct MergeChoice {
   bool bracket = false;                  // the exposures of frames that were read differ
   std::map<int, merge::Motion> motions;  // motions that were measured for the choice, of frames of equal exposure
   std::optional<MergePlan> plan;         // set where there is a budget
-  std::string warning;                   // empty: none
+  std::vector<std::string> warnings;
 };
 
 /// Chooses as the options state; what they leave open by the motion of two frames, the last, a middle and the first one

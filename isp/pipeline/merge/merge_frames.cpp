@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cstddef>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <string>
@@ -110,55 +111,66 @@ Result<void> merge_once(MergeContext& work) {
   }
   work.robust = choice->method.robust;
   work.out.plan = std::move(choice->plan);
-  if (!choice->warning.empty()) work.out.warnings.push_back(std::move(choice->warning));
+  std::ranges::move(choice->warnings, std::back_inserter(work.out.warnings));
   if (Result<void> possible = check_drizzling(work); !possible) return possible;
   if (work.out.alignment == MergeAlignment::none && !work.out.bracket) return merge_static(work);
   return merge_moved(work, std::move(choice->motions));
 }
 
-void warn_of_frames_left_out(MergedRaw& out) {
-  const auto left_out =
-      std::ranges::count_if(out.frames, [](const FrameUse& use) { return !use.aligned && use.used_fraction == 0; });
-  if (left_out == 0) return;
-  out.warnings.push_back(fmt::format("{} of {} frames were left out: {}", left_out, out.frames.size(),
-                                     out.alignment == MergeAlignment::stars
-                                         ? "their stars do not match those of the reference"
-                                         : "their displacement is too uncertain"));
-}
-
-void warn_of_unknown_displacements(MergedRaw& out) {
-  if (out.alignment == MergeAlignment::none) return;
-  const auto unknown =
-      std::ranges::count_if(out.frames, [](const FrameUse& use) { return !use.aligned && use.used_fraction > 0; });
-  if (unknown == 0) return;
-  out.warnings.push_back(
-      fmt::format("the displacement of {} of {} frames could not be found: only areas that match the reference without "
-                  "displacement were merged; try another --reference",
-                  unknown, out.frames.size()));
-}
-
-/// Finds frames with the samples of another one.
-class FrameCopies {
+/// Holds the names of the frames that were read, and finds frames with the samples of another one.
+class ReadFrames {
  public:
-  /// Notes the samples of a frame, which may be read several times.
+  /// Notes a frame, which may be read several times.
   void note(int index, const FrameToMerge& read) {
+    if (!names_.try_emplace(index, read.name).second) return;
     const auto hash = hash_of(read.frame.raw);
     if (!hash) return;
-    const auto [first, is_new] = first_.try_emplace(*hash, index, read.name);
-    if (is_new || first->second.first == index) return;
-    copies_.try_emplace(index, read.name, first->second.second);
+    const auto [first, is_new] = first_.try_emplace(*hash, index);
+    if (!is_new) copies_.emplace(index, first->second);
   }
 
-  void warn(MergedRaw& out) const {
+  void warn_of_copies(MergedRaw& out) const {
     if (copies_.empty()) return;
-    const auto& [copy, original] = copies_.begin()->second;
+    const auto& [copy, original] = *copies_.begin();
     out.warnings.push_back(fmt::format(
         "{} of {} frames have the samples of another frame ({} those of {}): copies do not reduce noise, and the file "
         "states less noise than it has; leave the copies out",
-        copies_.size(), out.frames.size(), copy, original));
+        copies_.size(), out.frames.size(), names_.at(copy), names_.at(original)));
+  }
+
+  void warn_of_frames_left_out(MergedRaw& out) const {
+    const Counted left_out = count(out, [](const FrameUse& use) { return !use.aligned && use.used_fraction == 0; });
+    if (left_out.frames == 0) return;
+    out.warnings.push_back(
+        fmt::format("{} of {} frames were left out ({}): {}", left_out.frames, out.frames.size(), left_out.first,
+                    out.alignment == MergeAlignment::stars ? "their stars do not match those of the reference"
+                                                           : "their displacement is too uncertain"));
+  }
+
+  void warn_of_unknown_displacements(MergedRaw& out) const {
+    if (out.alignment == MergeAlignment::none) return;
+    const Counted unknown = count(out, [](const FrameUse& use) { return !use.aligned && use.used_fraction > 0; });
+    if (unknown.frames == 0) return;
+    out.warnings.push_back(fmt::format(
+        "the displacement of {} of {} frames could not be found ({}): only areas that match the reference without "
+        "displacement were merged; leave these frames out, or try another --reference",
+        unknown.frames, out.frames.size(), unknown.first));
   }
 
  private:
+  /// Holds the number of some frames, and the name of the first of them.
+  struct Counted {
+    std::ptrdiff_t frames = 0;
+    std::string first;
+  };
+
+  Counted count(const MergedRaw& out, bool (*is_counted)(const FrameUse&)) const {
+    Counted counted{.frames = std::ranges::count_if(out.frames, is_counted)};
+    if (counted.frames == 0) return counted;
+    counted.first = names_.at(static_cast<int>(std::ranges::find_if(out.frames, is_counted) - out.frames.begin()));
+    return counted;
+  }
+
   /// Returns a hash of the samples; nullopt if all rows are equal, as they are in frames that are saturated everywhere.
   static std::optional<std::size_t> hash_of(const RawDn& raw) {
     std::size_t hash = 0;
@@ -177,8 +189,9 @@ class FrameCopies {
     return rows_differ ? std::optional(hash) : std::nullopt;
   }
 
-  std::map<std::size_t, std::pair<int, std::string>> first_;   // frame and name, by hash
-  std::map<int, std::pair<std::string, std::string>> copies_;  // names of copy and original, by frame
+  std::map<int, std::string> names_;
+  std::map<std::size_t, int> first_;  // frame, by hash
+  std::map<int, int> copies_;         // frame of which it is a copy, by frame
 };
 
 void state_times(MergeContext& work) {
@@ -196,10 +209,10 @@ Result<MergedRaw> merge_frames(int count, const FrameReader& read, const MergeOp
                                const MergeProgress& progress) {
   if (count < 1) return fail(ErrorCode::invalid_argument, "give at least one frame to merge");
   assert(!options.reference || (*options.reference >= 0 && *options.reference < count));
-  FrameCopies copies;
+  ReadFrames frames;
   const FrameReader noting = [&](int index, bool is_reference) {
     Result<FrameToMerge> frame = read(index, is_reference);
-    if (frame) copies.note(index, *frame);
+    if (frame) frames.note(index, *frame);
     return frame;
   };
   MergeContext work(count, noting, options, executor, progress);
@@ -211,9 +224,9 @@ Result<MergedRaw> merge_frames(int count, const FrameReader& read, const MergeOp
     if (done) done = merge_once(work);
   }
   if (!done) return tl::make_unexpected(done.error());
-  warn_of_frames_left_out(work.out);
-  warn_of_unknown_displacements(work.out);
-  copies.warn(work.out);
+  frames.warn_of_frames_left_out(work.out);
+  frames.warn_of_unknown_displacements(work.out);
+  frames.warn_of_copies(work.out);
   state_times(work);
   return std::move(work.out);
 }

@@ -278,20 +278,49 @@ TEST(MergeBracket, ExposuresOfManyStopsStateTheNoiseOfTheirHighlights) {
   }
 }
 
-TEST(MergeBracket, WithoutAnExposureTimeItIsRefused) {
-  Burst burst;
-  burst.light = [](int index) { return index == 1 ? 4.0 : 1.0; };
-  burst.disturb = [](RawFrame& frame, int index) {
-    if (index == 1) frame.raw.info.exposure_s.reset();
-  };
+/// Merges frames that are named "frame 0", "frame 1" ...
+Result<MergedRaw> merged_by_name(const Burst& burst, int count, const MergeOptions& options = {}) {
   InlineExecutor executor;
   const FrameReader read = [&](int index, bool) {
     return Result<FrameToMerge>({burst.frame(index), burst.options(), "frame " + std::to_string(index)});
   };
-  const auto merged = merge_frames(3, read, {}, executor);
-  ASSERT_FALSE(merged);
-  EXPECT_EQ(merged.error().code, ErrorCode::insufficient);
-  EXPECT_EQ(merged.error().where, "frame 1");
+  return merge_frames(count, read, options, executor);
+}
+
+TEST(MergeBracket, WithoutAnExposureTimeItIsRefused) {
+  for (const int bad : {0, 1}) {
+    Burst burst;
+    burst.light = [](int index) { return index == 1 ? 4.0 : 1.0; };
+    burst.disturb = [bad](RawFrame& frame, int index) {
+      if (index == bad) frame.raw.info.exposure_s.reset();
+    };
+    const auto merged = merged_by_name(burst, 3);
+    ASSERT_FALSE(merged);
+    EXPECT_EQ(merged.error().code, ErrorCode::insufficient);
+    EXPECT_EQ(merged.error().where, "frame " + std::to_string(bad));
+  }
+}
+
+// A frame of 0.002 e- shows nothing of the scene; one of 1/16 of the light of the other is aligned with it.
+TEST(MergeBracket, AFrameThatCannotBeAlignedIsNamedUnlessTheCameraIsStatedToRest) {
+  Burst burst{.width = 320, .height = 256};
+  burst.scene = [](double x, double y, int colour) { return test::textured(x, y, colour, 100); };
+  burst.position = test::hand_held_position(burst.width, burst.height, 20, 0);
+  const auto warnings_of = [&](double light, const MergeOptions& options) {
+    burst.light = [light](int index) { return index == 0 ? light : 1.0; };
+    const auto merged = merged_by_name(burst, 2, options);
+    EXPECT_TRUE(merged) << merged.error().message;
+    EXPECT_EQ(merged->reference, 1);
+    return merged->warnings;
+  };
+  const std::vector<std::string> unknown = warnings_of(1.0 / 50000, {});
+  ASSERT_EQ(unknown.size(), 1);
+  EXPECT_TRUE(unknown[0].starts_with("frame 0 could not be aligned with frame 1")) << unknown[0];
+  EXPECT_TRUE(warnings_of(1.0 / 50000, {.alignment = MergeAlignment::none}).empty());
+  const std::vector<std::string> aligned = warnings_of(1.0 / 50000, {.alignment = MergeAlignment::subpixel});
+  ASSERT_EQ(aligned.size(), 1);
+  EXPECT_NE(aligned[0].find("could not be found (frame 0)"), std::string::npos) << aligned[0];
+  EXPECT_TRUE(warnings_of(1.0 / 16, {}).empty());
 }
 
 }  // namespace

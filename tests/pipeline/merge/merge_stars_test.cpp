@@ -155,7 +155,8 @@ TEST(MergeStars, OtherStarsAreLeftOut) {
   const Burst burst = night(sky), clouded = night(other);
   InlineExecutor one;
   const FrameReader read = [&](int index, bool) {
-    return Result<FrameToMerge>({(index == 3 ? clouded : burst).frame(index), burst.options()});
+    const Burst& taken = index == 3 ? clouded : burst;
+    return Result<FrameToMerge>({taken.frame(index), burst.options(), index == 3 ? "other.dng" : "stars.dng"});
   };
   const auto merged = merge_frames(6, read, by_stars(), one);
   ASSERT_TRUE(merged) << merged.error().message;
@@ -163,7 +164,8 @@ TEST(MergeStars, OtherStarsAreLeftOut) {
   EXPECT_EQ(merged->frames[3].used_fraction, 0);
   EXPECT_TRUE(merged->frames[4].aligned);
   ASSERT_FALSE(merged->warnings.empty());
-  EXPECT_EQ(merged->warnings.back(), "1 of 6 frames were left out: their stars do not match those of the reference");
+  EXPECT_EQ(merged->warnings.back(),
+            "1 of 6 frames were left out (other.dng): their stars do not match those of the reference");
 }
 
 TEST(MergeStars, AFrameWithoutStarsIsNoReference) {
