@@ -17,6 +17,7 @@ namespace lowlux::isp {
 namespace {
 
 constexpr double max_noise_ratio = 1.2;  // of the variance of frames of one ISO
+constexpr double max_dark_ratio = 2;     // of the variance without light, of frames whose range differs
 constexpr double max_saturated = 0.5;    // share of the sites of a reference
 constexpr int counted_rows = 8;          // of so many, two are counted
 
@@ -92,12 +93,20 @@ double saturated_fraction(const RawDn& raw, const std::optional<SaturationLevel>
 
 std::string iso_text(const std::optional<double>& iso) { return iso ? fmt::format("{:g}", *iso) : "not stated"; }
 
-/// Returns whether both frames state their noise, and differently: one of them was processed.
-bool noise_differs(const std::optional<NoiseProfile>& expected, const std::optional<NoiseProfile>& noise) {
+bool is_within(double ratio, double max_ratio) { return ratio > 1 / max_ratio && ratio < max_ratio; }
+
+/// Returns whether both frames state their noise, and differently: one of them was processed. A mean of N frames with
+/// about N times their range, such as that of 4 frames of 14 bits in 16 bits, has their noise per light, but not
+/// without light.
+/// @param of_reference  noise of the reference; `expected` is the same in the units of the frame
+bool noise_differs(const std::optional<NoiseProfile>& of_reference, const std::optional<NoiseProfile>& expected,
+                   const std::optional<NoiseProfile>& noise) {
   const auto is_stated = [](const auto& n) { return n && n->source != NoiseProfile::Source::picture; };
   if (!is_stated(expected) || !is_stated(noise)) return false;
-  const double ratio = noise->scale[1] / expected->scale[1];
-  return !(ratio > 1 / max_noise_ratio && ratio < max_noise_ratio);
+  if (!is_within(noise->scale[1] / expected->scale[1], max_noise_ratio)) return true;
+  const bool has_same_range = is_within(expected->scale[1] / of_reference->scale[1], max_noise_ratio);
+  return !has_same_range && expected->offset[1] > 0 &&
+         !is_within(noise->offset[1] / expected->offset[1], max_dark_ratio);
 }
 
 }  // namespace
@@ -166,7 +175,7 @@ Result<FrameElectrons> FrameLoader::next() {
   if (same_gain) {
     Result<std::optional<NoiseProfile>> expected = noise_at_levels(reference_, *read);
     if (!expected) return tl::make_unexpected(at_frame(expected.error(), last_name_));
-    if (noise_differs(*expected, frame.noise)) {
+    if (noise_differs(reference_.frame.noise, *expected, frame.noise)) {
       return tl::make_unexpected(
           at_frame({ErrorCode::invalid_argument,
                     "its noise is not that of the reference at the same ISO: only unprocessed raw files can be merged",

@@ -126,6 +126,20 @@ TEST(MergeStatic, RefusesFramesThatDoNotFit) {
   }
 }
 
+// Four frames of 14 bits in 16 bits have the noise of one frame in units of its range.
+TEST(MergeStatic, RefusesAMergedFileAmongItsFrames) {
+  const Burst burst;
+  for (const int merged_at : {0, 2}) {
+    const FrameReader read = [&](int index, bool) {
+      return Result<FrameToMerge>({index == merged_at ? burst.merged(4).frame : burst.frame(index), burst.options()});
+    };
+    InlineExecutor executor;
+    const auto again = merge_frames(4, read, {}, executor);
+    ASSERT_FALSE(again);
+    EXPECT_NE(again.error().message.find("its noise is not"), std::string::npos) << again.error().message;
+  }
+}
+
 TEST(MergeStatic, AReaderThatFailsEndsTheMerge) {
   const Burst burst;
   for (const int bad : {0, 2, 4}) {
