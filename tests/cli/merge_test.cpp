@@ -257,6 +257,16 @@ TEST_F(MergeCommand, NoDisplacementIsStatedWhereNoneCouldBeFound) {
   EXPECT_EQ(text.out.find("moved by"), std::string::npos) << text.out;
 }
 
+TEST_F(MergeCommand, FramesThatAreNotComparedAreNotSaidToMatch) {
+  const auto plain = merge(frames_, {"--mean", "plain", "--explain"});
+  ASSERT_EQ(plain.exit_code, 0) << plain.err;
+  EXPECT_EQ(plain.out.find("matches"), std::string::npos) << plain.out;
+  EXPECT_NE(plain.out.find("averaged without comparing it"), std::string::npos) << plain.out;
+  const auto single = merge({frames_[0]}, {"--json", "--force"});
+  ASSERT_EQ(single.exit_code, 0) << single.err;
+  EXPECT_EQ(Json::parse(single.out)["frames"][0]["reason"], "it is the reference");
+}
+
 TEST_F(MergeCommand, DrizzlesANightThatOtherCommandsDevelop) {
   std::filesystem::create_directory(file("night"));
   const auto made =

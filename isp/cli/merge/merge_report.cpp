@@ -26,15 +26,16 @@ std::string_view alignment_name(isp::MergeAlignment alignment) {
 
 constexpr double little_used = 0.1;  // fraction of the image; frames used less are reported
 
-std::string reason_of(const isp::FrameUse& use, bool by_stars) {
+std::string reason_of(const isp::FrameUse& use, bool is_reference, bool by_stars) {
   if (!use.aligned) return by_stars ? "its stars do not match" : "its displacement could not be found";
+  if (!use.is_compared) return is_reference ? "it is the reference" : "it was averaged without comparing it";
   if (use.used_fraction > 0.99) return "it matches the reference";
-  const bool is_compared = use.mean_chi_square > 0 || use.outliers > 0;
-  if (use.used_fraction == 0 && !is_compared)
+  const bool has_differences = use.mean_chi_square > 0 || use.outliers > 0;
+  if (use.used_fraction == 0 && !has_differences)
     return "no part of it can be compared, for example because one frame is saturated";
   if (use.mean_chi_square > 2 || use.used_fraction < little_used)
     return "it differs from the reference by more than the noise";
-  return "parts of its content moved";
+  return "parts of it do not match the reference";
 }
 
 std::string method_name(const isp::MergeMethod& method) {
@@ -75,7 +76,7 @@ std::optional<std::string> unmatched_frames_warning(const std::vector<std::strin
     // Frames at rest are compared with what most of them show, the first one too.
     const bool is_reference = merged.alignment != isp::MergeAlignment::none && static_cast<int>(i) == merged.reference;
     if (is_reference || !use.aligned || use.used_fraction >= little_used) continue;
-    if (++count == 1) first = fmt::format("{}: {}", inputs[i], reason_of(use, false));
+    if (++count == 1) first = fmt::format("{}: {}", inputs[i], reason_of(use, false, false));
   }
   if (count == 0) return std::nullopt;
   return fmt::format(
@@ -97,17 +98,19 @@ std::string merge_text(const MergeReport& report) {
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     const isp::FrameUse& use = merged.frames[i];
     const bool moved = merged.alignment != isp::MergeAlignment::none;
-    if (moved && !by_stars && static_cast<int>(i) == merged.reference) {
+    const bool is_reference = static_cast<int>(i) == merged.reference;
+    if (moved && !by_stars && is_reference) {
       out.add(i == 0 ? "used" : "", fmt::format("{}: 100 %: it is the reference", inputs[i]));
       continue;
     }
-    std::string text = fmt::format("{}: {:.1f} %: {}", inputs[i], 100 * use.used_fraction, reason_of(use, by_stars));
+    std::string text =
+        fmt::format("{}: {:.1f} %: {}", inputs[i], 100 * use.used_fraction, reason_of(use, is_reference, by_stars));
     if (moved && use.aligned)
       text += fmt::format("; moved by up to {:.2f} px (+- {:.2f})", use.largest_shift_px, use.shift_error_px);
-    if (by_stars && static_cast<int>(i) == merged.reference)
-      text += "; it is the reference";
-    else if (by_stars)
+    if (by_stars && !is_reference)
       text += fmt::format("; {} of {} stars", use.stars_matched, merged.stars);
+    else if (by_stars && use.is_compared)
+      text += "; it is the reference";
     if (merged.bracket) text += fmt::format("; {:.4g} times the light", use.light);
     if (use.outliers > 0) text += fmt::format("; {} sites left out", use.outliers);
     out.add(i == 0 ? "used" : "", text);
@@ -125,8 +128,9 @@ std::string merge_json(const MergeReport& report) {
   Json frames = Json::array();
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     const isp::FrameUse& use = merged.frames[i];
+    const bool is_reference = static_cast<int>(i) == merged.reference;
     frames.push_back({{"file", inputs[i]},
-                      {"reference", static_cast<int>(i) == merged.reference},
+                      {"reference", is_reference},
                       {"used_fraction", use.used_fraction},
                       {"outliers", use.outliers},
                       {"stars_matched", use.stars_matched},
@@ -135,7 +139,7 @@ std::string merge_json(const MergeReport& report) {
                       {"aligned", use.aligned},
                       {"largest_shift_px", use.aligned ? Json(use.largest_shift_px) : Json()},
                       {"shift_error_px", use.aligned ? Json(use.shift_error_px) : Json()},
-                      {"reason", reason_of(use, by_stars)}});
+                      {"reason", reason_of(use, is_reference, by_stars)}});
   }
   Json times = Json::array();
   for (const isp::StageTime& time : merged.times) times.push_back({{"stage", time.stage}, {"seconds", time.seconds}});

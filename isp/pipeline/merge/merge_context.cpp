@@ -18,6 +18,7 @@ Result<void> MergeContext::begin() {
   width = reference.signal_e.width();
   height = reference.signal_e.height();
   added = 0;
+  out.frames.assign(static_cast<std::size_t>(count), {});
   reference_fraction = 1;
   return {};
 }
@@ -46,6 +47,7 @@ merge::Comparison MergeContext::compared(Plane<float>& mosaic, const merge::Mosa
                              mosaic.view(), noise, comparison, executor);
   FrameUse& use = out.frames[static_cast<std::size_t>(index)];
   use.used_fraction = found.matching_fraction;
+  use.is_compared = true;
   use.outliers = found.outliers;
   use.mean_chi_square = found.mean_chi_square;
   clock.lap("comparison");

@@ -217,7 +217,6 @@ Result<MergedRaw> merge_frames(int count, const FrameReader& read, const MergeOp
   };
   MergeContext work(count, noting, options, executor, progress);
   work.out.reference = options.reference.value_or(0);
-  work.out.frames.resize(static_cast<std::size_t>(count));
   Result<void> done = merge_once(work);
   if (done && work.loader.exposures_differ() && !work.out.bracket) {
     done = begin_bracket(work);

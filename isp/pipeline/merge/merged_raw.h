@@ -57,6 +57,7 @@ struct MergePlan {
 /// States how much of a frame was used, and why not more.
 struct FrameUse {
   double used_fraction = 1;    // fraction of the comparable sites that were used
+  bool is_compared = false;    // with the reference; false: it is averaged as it is
   std::int64_t outliers = 0;   // single sites left out: cosmic rays, satellites
   double mean_chi_square = 1;  // squared difference to the reference over its variance; 1 for a static scene
   double largest_shift_px = 0;
