@@ -306,11 +306,13 @@ TEST(MergeBracket, AFrameThatCannotBeAlignedIsNamedUnlessTheCameraIsStatedToRest
   Burst burst{.width = 320, .height = 256};
   burst.scene = [](double x, double y, int colour) { return test::textured(x, y, colour, 100); };
   burst.position = test::hand_held_position(burst.width, burst.height, 20, 0);
-  const auto warnings_of = [&](double light, const MergeOptions& options) {
+  const auto warnings_of = [&](double light, const MergeOptions& options) {  // of the alignment
     burst.light = [light](int index) { return index == 0 ? light : 1.0; };
-    const auto merged = merged_by_name(burst, 2, options);
+    auto merged = merged_by_name(burst, 2, options);
     EXPECT_TRUE(merged) << merged.error().message;
     EXPECT_EQ(merged->reference, 1);
+    std::erase_if(merged->warnings,
+                  [](const std::string& text) { return text.find("could not be") == std::string::npos; });
     return merged->warnings;
   };
   const std::vector<std::string> unknown = warnings_of(1.0 / 50000, {});
