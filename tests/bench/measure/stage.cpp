@@ -1,12 +1,14 @@
 // How fast the stage of isp/adapter is, by the protocol of libcamera's software ISP: 30 frames to warm up, the mean of
 // the next 30, lowlux_stage_process alone; and what its levels gain on a night scene that stands still.
-//   measure stage [PICTURE] [--small] [--mode NAME] [--threads N] [--look camera|eye]
-// PICTURE: a name of testdata/pictures, kodim19.png by default; --small: 1920 x 1080 alone; the others: these alone.
+//   measure stage [PICTURE] [--small] [--mode NAME] [--threads N] [--look camera|eye] [--target NAME]
+// PICTURE: a name of testdata/pictures, kodim19.png by default; --small: 1920 x 1080 alone; the others: these alone;
+// --target: kernels for this instruction set, as Highway names it (AVX3, AVX2, SSE4, SSSE3), instead of the best.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -19,6 +21,7 @@
 #include "isp/base/plane.h"
 #include "tests/bench/measure/measure.h"
 #include "tests/sensor_bench/picture_raw.h"
+#include "tests/support/only_target.h"
 
 namespace {
 
@@ -40,6 +43,7 @@ constexpr Mode modes[] = {
     {"standard", LOWLUX_STAGE_DENOISE_HIGH_QUALITY, LOWLUX_STAGE_LEVEL_STANDARD, 0},
     {"temporal", LOWLUX_STAGE_DENOISE_MINIMAL, LOWLUX_STAGE_LEVEL_NONE, 1},
     {"temporal + draft", LOWLUX_STAGE_DENOISE_FAST, LOWLUX_STAGE_LEVEL_DRAFT, 1},
+    {"temporal + standard", LOWLUX_STAGE_DENOISE_HIGH_QUALITY, LOWLUX_STAGE_LEVEL_STANDARD, 1},
 };
 
 using Codes = std::vector<std::uint16_t>;
@@ -172,6 +176,16 @@ struct Choice {
   bool small = false;
 };
 
+/// Returns the instruction set of a name. Throws a Failure that lists those of the processor.
+std::int64_t target_named(const std::string& name) {
+  std::string known;
+  for (const std::int64_t target : test::kernel_targets()) {
+    if (name == hwy::TargetName(target)) return target;
+    known += std::string(" ") + hwy::TargetName(target);
+  }
+  throw test::Failure(2, "unknown instruction set " + name + "; this processor has" + known);
+}
+
 bool wanted(const Choice& choice, const Mode& mode, bool eye, int threads) {
   return (choice.mode.empty() || choice.mode == mode.name) && (choice.threads == 0 || choice.threads == threads) &&
          (choice.look.empty() || choice.look == (eye ? "eye" : "camera"));
@@ -190,7 +204,7 @@ void bench_size(const Plane<float>& light, double mean_e, Size size, const Choic
       "\n%d x %d, RG10 to XBGR8888, %.3g e- in a mean green pixel, 2 e- of read noise, memcpy of as many bytes %.2f "
       "ms\n",
       size.width, size.height, mean_e, copy);
-  std::printf("%-18s%-8s%-8s%10s%10s%10s%10s%10s%10s\n", "mode", "look", "threads", "ms mean", "ms least", "Mpx/s",
+  std::printf("%-20s%-8s%-8s%10s%10s%10s%10s%10s%10s\n", "mode", "look", "threads", "ms mean", "ms least", "Mpx/s",
               "frames/s", "x memcpy", "PSNR dB");
   for (const bool eye : {false, true}) {
     Bench truth(modes[0], eye, 2, size);
@@ -207,7 +221,7 @@ void bench_size(const Plane<float>& light, double mean_e, Size size, const Choic
           least = std::min(least, ms);
         }
         const double mean = sum / measured;
-        std::printf("%-18s%-8s%-8d%10.2f%10.2f%10.1f%10.1f%10.1f%10s\n", mode.name, eye ? "eye" : "camera", threads,
+        std::printf("%-20s%-8s%-8d%10.2f%10.2f%10.1f%10.1f%10.1f%10s\n", mode.name, eye ? "eye" : "camera", threads,
                     mean, least, megapixels * 1000 / mean, 1000 / mean, mean / copy,
                     distinct < warm_up + measured
                         ? "-"
@@ -223,6 +237,7 @@ void bench_size(const Plane<float>& light, double mean_e, Size size, const Choic
 int lowlux::test::measure_stage(Arguments& arguments) {
   const Choice choice{arguments.option("--mode").value_or(""), arguments.option("--look").value_or(""),
                       arguments.option("--threads", 0, 1), arguments.flag("--small")};
+  const std::optional<std::string> target = arguments.option("--target");
   const std::string picture = arguments.next().value_or("kodim19.png");
   arguments.end();
   const bool eye = choice.look == "eye";
@@ -230,6 +245,8 @@ int lowlux::test::measure_stage(Arguments& arguments) {
   if (std::ranges::none_of(modes, [&](const Mode& mode) { return wanted(choice, mode, eye, threads); })) {
     throw Failure(2, "unknown mode or look, or threads other than 1 and 2");
   }
+  std::optional<OnlyTarget> only;
+  if (target) only.emplace(target_named(*target));
   PoolExecutor executor(2);
   const PictureLight light = value_of(picture_light(picture, executor, 0.6));
   std::printf("lowlux stage, vectors: %s\n", unpack_target());
