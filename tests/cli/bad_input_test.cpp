@@ -133,8 +133,8 @@ TEST_F(BadInput, DamagedTagsThatThePictureCanDoWithoutAreWarningsThatHelp) {
   }
 }
 
-// Without a black level a mosaic gives the picture of a level of 0, and one warning with the cure, which a level that
-// the user gives makes needless.
+// A mosaic without a black level is developed as with a level of 0, and a warning names the option that sets another.
+// There is no warning if the user gives a level.
 TEST_F(BadInput, AMissingBlackLevelIsTheDefaultOfDng) {
   const auto picture_and_warnings = [&](const DngBuilder& dng, const std::vector<std::string>& options) {
     const std::vector<std::byte> bytes = dng.build();

@@ -217,7 +217,7 @@ TEST(BlackPoint, NeitherTagNorMaskedPixelsIsRefusedAndNotGuessed) {
   EXPECT_FALSE(choose_black(raw, {BlackChoice::masked}));  // asked for, so the tag does not stand in
 }
 
-// The default comes last, is no tag, and takes no place of a level that is measured or given.
+// Levels that are measured or given come before the default of the format, which does not count as a tag.
 TEST(BlackPoint, TheDefaultOfTheFormatIsUsedWhereNothingElseIsKnown) {
   const BlackPoint of_profile{.pedestal_dn = {500, 501, 502, 503}, .source = BlackPoint::Source::profile};
   RawDn raw = frame_with_masked_columns(11);

@@ -228,7 +228,7 @@ TEST_F(AutoExposureOfCapture, TakesTheNoiseOfAProfileForRawFilesToo) {
     gain.sensor.emplace();
     gain.sensor->bits = 12;
     gain.sensor->white_level_dn = 4095;
-    gain.sensor->system_gain_dn_per_e = 4 * iso / 100;  // its rounding to codes is no noise
+    gain.sensor->system_gain_dn_per_e = 4 * iso / 100;  // high enough that rounding to codes adds no noise
     gain.sensor->full_well_e = 4095 / gain.sensor->system_gain_dn_per_e;
     gain.sensor->read_noise_e = 3;
     profile.gains.push_back(gain);
