@@ -91,6 +91,7 @@ TEST_F(MergeCommand, HandHeldTextureKeepsTheMeanOfEachColour) {
             {"--luminance", "0.3", "--exposure", "0.05", "--gain", "1600", "--frames", "6", "--shake", "6", "--seed",
              "1", "--no-truth"});
   std::vector<std::string> frames;
+  frames.reserve(6);
   for (int i = 0; i < 6; ++i) frames.push_back(file("hand_000" + std::to_string(i) + ".dng"));
   ASSERT_EQ(merge(frames).exit_code, 0);
   const auto one = capture::read_raw(frames[0]), merged = capture::read_raw(file("merged.dng"));
@@ -192,6 +193,7 @@ TEST_F(MergeCommand, DarkChargeThatIsEstimatedIsDecidedOnceForAllFrames) {
               {"--luminance", "0.1", "--exposure", "1", "--gain", "1600", "--dark-current", "6", "--temperature",
                temperature, "--frames", "6", "--seed", "1", "--no-truth", "--force"});
     std::vector<std::string> frames;
+    frames.reserve(6);
     for (int i = 0; i < 6; ++i) frames.push_back(file("still_000" + std::to_string(i) + ".dng"));
     const auto result = merge(frames, {"--json", "--force"});
     ASSERT_EQ(result.exit_code, 0) << result.err;

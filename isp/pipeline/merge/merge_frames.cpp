@@ -110,7 +110,7 @@ Result<void> merge_once(MergeContext& work) {
     if (work.out.reference != first || is_saturation_new) return merge_once(work);
   }
   work.robust = choice->method.robust;
-  work.out.plan = std::move(choice->plan);
+  work.out.plan = choice->plan;
   std::ranges::move(choice->warnings, std::back_inserter(work.out.warnings));
   if (Result<void> possible = check_drizzling(work); !possible) return possible;
   if (work.out.alignment == MergeAlignment::none && !work.out.bracket) return merge_static(work);

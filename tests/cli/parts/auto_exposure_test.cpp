@@ -303,7 +303,7 @@ TEST_F(AutoExposureOfCapture, IsReported) {
   EXPECT_NE(cli::progress_text(state).find("; exposure 0.04 s, gain 8"), std::string::npos);
   const std::string json = cli::capture_json(state, nullptr);
   for (const char* const part :
-       {"\"exposure_s\": 0.04", "\"analogue_gain\": 8.0", "\"limit\": \"time\"", "\"changes\": 3"}) {
+       {R"("exposure_s": 0.04)", R"("analogue_gain": 8.0)", R"("limit": "time")", R"("changes": 3)"}) {
     EXPECT_NE(json.find(part), std::string::npos) << json;
   }
 }
