@@ -134,7 +134,7 @@ TEST_F(BadInput, DamagedTagsThatThePictureCanDoWithoutAreWarningsThatHelp) {
 }
 
 // A mosaic without a black level is developed as with a level of 0, and a warning names the option that sets another.
-// There is no warning if the user gives a level.
+// A level that the user gives is used without a warning.
 TEST_F(BadInput, AMissingBlackLevelIsTheDefaultOfDng) {
   const auto picture_and_warnings = [&](const DngBuilder& dng, const std::vector<std::string>& options) {
     const std::vector<std::byte> bytes = dng.build();

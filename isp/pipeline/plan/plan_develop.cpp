@@ -145,8 +145,7 @@ Result<DevelopPlan> plan_develop(const RawFrame& frame, const DevelopOptions& op
   if (levels->black.source == BlackPoint::Source::format_default) {
     plan.warnings.emplace_back(
         "the file states no black level, so 0 is used, the default of DNG; if the shadows are pale or coloured, give "
-        "it with "
-        "--black DN");
+        "it with --black DN");
   }
   clock.lap("black point");
 
