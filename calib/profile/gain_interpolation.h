@@ -20,6 +20,9 @@ struct GainAtIso {
 /// Errors: see profile_at.
 Result<GainAtIso> gain_at_iso(const CameraProfile& profile, const std::optional<double>& iso);
 
+/// ISO speed of an analogue gain of 1.
+inline constexpr double unit_iso = 100;
+
 /// Returns the ISO of the profile's only gain setting, which also holds for frames that state no ISO; absent if the
 /// profile has several settings, none, or states no ISO.
 std::optional<double> only_iso(const CameraProfile& profile);

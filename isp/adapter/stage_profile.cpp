@@ -19,7 +19,6 @@
 namespace lowlux::isp {
 namespace {
 
-constexpr double unit_iso = 100;  // ISO speed of an analogue gain of 1
 constexpr double shortest_frame_s = 0.04;
 constexpr double hot_deviations = 6;
 
@@ -32,7 +31,7 @@ double between_logs(double a, double b, double share) {
 std::vector<double> iso_grid(const CameraProfile& profile) {
   std::vector<double> out;
   out.reserve(69 + profile.gains.size());
-  for (int quarter = -12; quarter <= 56; ++quarter) out.push_back(unit_iso * std::exp2(quarter / 4.0));
+  for (int quarter = -12; quarter <= 56; ++quarter) out.push_back(calib::unit_iso * std::exp2(quarter / 4.0));
   for (const GainProfile& gain : profile.gains) {
     if (gain.iso) out.push_back(*gain.iso);
   }
@@ -136,7 +135,8 @@ Result<void> StageProfile::prepare(const RawFormat& format, BayerPhase phase) {
 std::optional<StageSensor> StageProfile::at(std::optional<double> analogue_gain, std::optional<double> exposure_s,
                                             std::optional<double> temperature_c) const {
   if (rows_.empty()) return std::nullopt;
-  const double stated_iso = analogue_gain ? unit_iso * *analogue_gain : calib::only_iso(profile_).value_or(unit_iso);
+  const double stated_iso =
+      analogue_gain ? calib::unit_iso * *analogue_gain : calib::only_iso(profile_).value_or(calib::unit_iso);
   const double iso = std::clamp(stated_iso, rows_.front().iso, rows_.back().iso);
   auto above = std::ranges::upper_bound(rows_, iso, {}, &Row::iso);
   if (above == rows_.end()) --above;

@@ -19,7 +19,6 @@ namespace {
 
 constexpr double usual_frame_rate_hz = 30;
 constexpr double usual_clipped_fraction = 1e-3;
-constexpr double unit_iso = 100;  // ISO speed of an analogue gain of 1
 constexpr double first_exposure_s = 0.01;
 constexpr int latency_of_controls = 4;  // frames from a setting to its effect, at most
 constexpr double max_black = 0.25;      // of white: no camera has a higher pedestal
@@ -89,7 +88,7 @@ Result<std::unique_ptr<AutoExposure>> AutoExposure::make(const CaptureArgs& args
   for (const capture::CameraGain& gain : controls->gains) factors.push_back(gain.factor);
   if (factors.empty()) {
     const auto iso = *profile ? calib::only_iso(**profile) : std::nullopt;
-    factors.push_back(args.request.analogue_gain.value_or(iso.value_or(unit_iso) / unit_iso));
+    factors.push_back(args.request.analogue_gain.value_or(iso.value_or(calib::unit_iso) / calib::unit_iso));
   }
   const double white_dn = largest_code(format.raw);
   auto gains = calib::exposure_gains(factors, format.raw, white_dn, *profile ? &**profile : nullptr);
